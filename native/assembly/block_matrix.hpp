@@ -1,0 +1,31 @@
+// A symmetric matrix of 3x3 node blocks over a BlockPattern.
+#pragma once
+
+#include <memory>
+
+#include "assembly/block_pattern.hpp"
+#include "simd/aligned.hpp"
+
+namespace qlb {
+
+class BlockMatrix {
+ public:
+  explicit BlockMatrix(std::shared_ptr<const BlockPattern> pattern)
+      : pattern_(std::move(pattern)), values_(9 * pattern_->blocks(), 0.0) {}
+
+  const BlockPattern& pattern() const { return *pattern_; }
+  std::shared_ptr<const BlockPattern> shared_pattern() const { return pattern_; }
+  double* values() { return values_.data(); }  // (blocks, 3, 3), row by row; diagonal blocks are filled whole
+  const double* values() const { return values_.data(); }
+
+  void set_zero(int threads);
+  void shift_diagonal(double amount);
+  // out = A x, both (nodes, 3)
+  void multiply(const double* x, double* out) const;
+
+ private:
+  std::shared_ptr<const BlockPattern> pattern_;
+  Aligned<double> values_;
+};
+
+}  // namespace qlb

@@ -1,0 +1,29 @@
+#include "bindings/bindings.hpp"
+
+#include <cblas.h>
+#include <cholmod.h>
+#include <metis.h>
+
+#include "elements/dispatch.hpp"
+
+NB_MODULE(_native, m) {
+  using namespace qlb;
+  m.doc() = "Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.";
+  bind_assembly(m);
+  bind_energies(m);
+  bind_linalg(m);
+  m.def("simd_levels", &simd_levels, "SIMD levels this build and this machine can run, the one in use last");
+  m.def("material_names", &material_names);
+  m.def("libraries", [] {
+    nb::dict versions;
+    versions["OpenBLAS"] = std::string(openblas_get_config());
+    int cholmod[3];
+    cholmod_l_version(cholmod);
+    versions["CHOLMOD"] =
+        std::to_string(cholmod[0]) + "." + std::to_string(cholmod[1]) + "." + std::to_string(cholmod[2]);
+    versions["METIS"] = std::to_string(METIS_VER_MAJOR) + "." + std::to_string(METIS_VER_MINOR) + "." +
+                        std::to_string(METIS_VER_SUBMINOR);
+    versions["compiler"] = std::string(__VERSION__);
+    return versions;
+  });
+}

@@ -1,0 +1,88 @@
+#include "elements/elastic_energy.hpp"
+
+#include <numeric>
+#include <stdexcept>
+
+#include "elements/dispatch.hpp"
+
+namespace qlb {
+namespace {
+
+// target[t, :] += scale * (sum of its slots), in the fixed order of the lists.
+template <int N>
+void add_slots(const SlotLists& lists, const double* slots, double scale, double* target, int threads) {
+  const auto targets = static_cast<std::int64_t>(lists.begin.size()) - 1;
+#pragma omp parallel for schedule(static) num_threads(threads)
+  for (std::int64_t t = 0; t < targets; ++t) {
+    double sum[N] = {};
+    for (std::int64_t k = lists.begin[t]; k < lists.begin[t + 1]; ++k) {
+      const double* slot = slots + N * static_cast<std::int64_t>(lists.slot[k]);
+      for (int i = 0; i < N; ++i) sum[i] += slot[i];
+    }
+    for (int i = 0; i < N; ++i) target[N * t + i] += scale * sum[i];
+  }
+}
+
+}  // namespace
+
+ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
+                             std::span<const double> parameters, int threads, const std::string& simd_level)
+    : blocks_(std::move(blocks)), kernels_(&find_kernels(material, simd_level)), threads_(threads) {
+  const std::int64_t count = kernels_->parameter_count;
+  if (static_cast<std::int64_t>(parameters.size()) != blocks_->elements * count)
+    throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) + " parameters per element");
+  parameters_ = blocks_->scatter(parameters, count);
+  positions_.resize(4 * blocks_->slot_node.size());
+  slot_gradient_.resize(3 * blocks_->slot_node.size());
+  chunk_energy_.resize(blocks_->chunks.size());
+}
+
+ChunkData ElasticEnergy::chunk_data(const Chunk& c) const {
+  const TetBlocks& b = *blocks_;
+  return {b.vertex.data() + c.first_pack * 4 * kLanes,
+          b.pair.data() + c.first_pack * kPairs * kLanes,
+          b.shape.data() + c.first_pack * 9 * kLanes,
+          b.volume.data() + c.first_pack * kLanes,
+          parameters_.data() + c.first_pack * kernels_->parameter_count * kLanes,
+          c.packs,
+          b.slot_node.data() + c.first_slot,
+          c.slots,
+          c.block_slots};
+}
+
+template <class Kernel>
+void ElasticEnergy::for_each_chunk(const Kernel& kernel) {
+  const auto count = static_cast<std::int64_t>(blocks_->chunks.size());
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+  for (std::int64_t k = 0; k < count; ++k) {
+    const Chunk& chunk = blocks_->chunks[k];
+    kernel(k, chunk, chunk_data(chunk), positions_.data() + 4 * chunk.first_slot);
+  }
+}
+
+double ElasticEnergy::value(const double* x) {
+  for_each_chunk([&](std::int64_t k, const Chunk&, const ChunkData& data, double* scratch) {
+    chunk_energy_[k] = kernels_->value(data, x, scratch);
+  });
+  return std::accumulate(chunk_energy_.begin(), chunk_energy_.end(), 0.0);
+}
+
+double ElasticEnergy::add_value_gradient(const double* x, double scale, double* gradient) {
+  for_each_chunk([&](std::int64_t k, const Chunk& chunk, const ChunkData& data, double* scratch) {
+    chunk_energy_[k] = kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + 3 * chunk.first_slot);
+  });
+  add_slots<3>(blocks_->node_slots, slot_gradient_.data(), scale, gradient, threads_);
+  return scale * std::accumulate(chunk_energy_.begin(), chunk_energy_.end(), 0.0);
+}
+
+void ElasticEnergy::add_hessian(const double* x, double scale, bool project, BlockMatrix& matrix) {
+  if (matrix.pattern().blocks() + 1 != static_cast<std::int64_t>(blocks_->block_slots.begin.size()))
+    throw std::invalid_argument("the matrix has another pattern than the elements");
+  slot_blocks_.resize(9 * blocks_->block_slots.slot.size());
+  for_each_chunk([&](std::int64_t, const Chunk& chunk, const ChunkData& data, double* scratch) {
+    kernels_->hessian(data, x, project, scratch, slot_blocks_.data() + 9 * chunk.first_block_slot);
+  });
+  add_slots<9>(blocks_->block_slots, slot_blocks_.data(), scale, matrix.values(), threads_);
+}
+
+}  // namespace qlb

@@ -1,0 +1,43 @@
+// Psi(x) = sum over elements of rest volume times energy density, with its derivatives.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "assembly/block_matrix.hpp"
+#include "elements/kernels.hpp"
+#include "elements/tet_blocks.hpp"
+
+namespace qlb {
+
+class ElasticEnergy {
+ public:
+  // parameters (elements, count) as the material wants them.
+  ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
+                std::span<const double> parameters, int threads, const std::string& simd_level);
+
+  double value(const double* x);  // [J]
+  // gradient += scale dPsi/dx; returns scale Psi.
+  double add_value_gradient(const double* x, double scale, double* gradient);
+  void add_hessian(const double* x, double scale, bool project, BlockMatrix& matrix);
+
+  std::int64_t nodes() const { return blocks_->nodes; }
+
+ private:
+  ChunkData chunk_data(const Chunk& chunk) const;
+  // kernel(chunk, data, scratch) over all chunks in parallel.
+  template <class Kernel>
+  void for_each_chunk(const Kernel& kernel);
+
+  std::shared_ptr<const TetBlocks> blocks_;
+  const MaterialKernels* kernels_;
+  Aligned<double> parameters_;
+  int threads_;
+  Aligned<double> positions_;      // (slots, 4)
+  Aligned<double> slot_gradient_;  // (slots, 3)
+  Aligned<double> slot_blocks_;    // (block slots, 3, 3)
+  std::vector<double> chunk_energy_;
+};
+
+}  // namespace qlb

@@ -1,0 +1,246 @@
+// The one loop over elements that serves every material. V is a SIMD vector, M<V> a material (materials/material.hpp).
+// Functions that are not templates over V are static: each SIMD level keeps its own.
+#pragma once
+
+#include "elements/kernels.hpp"
+#include "elements/lanes.hpp"
+#include "materials/material.hpp"
+#include "simd/svd3.hpp"
+
+namespace qlb {
+
+// Rest shape and parameters of V::size elements: lanes [lane, lane + V::size) of a pack.
+template <class V>
+struct Tets {
+  Mat3<V> Dm_inverse;
+  V volume;
+  const std::int64_t* vertex;  // vertex[a * kLanes + lane]
+  const std::int32_t* pair;
+
+  Tets(const ChunkData& chunk, std::int64_t pack, int lane) {
+    for (int k = 0; k < 9; ++k) Dm_inverse(k / 3, k % 3) = V::load_aligned(chunk.shape + (pack * 9 + k) * kLanes + lane);
+    volume = V::load_aligned(chunk.volume + pack * kLanes + lane);
+    vertex = chunk.vertex + pack * 4 * kLanes + lane;
+    pair = chunk.pair + pack * kPairs * kLanes + lane;
+  }
+
+  Mat3<V> deformation_gradient(const double* positions) const {
+    const Vec3<V> x0 = gather<V>(positions, vertex);
+    Mat3<V> Ds;
+    for (int a = 0; a < 3; ++a) {
+      const Vec3<V> xa = gather<V>(positions, vertex + (a + 1) * kLanes);
+      set_column(Ds, a, {xa[0] - x0[0], xa[1] - x0[1], xa[2] - x0[2]});
+    }
+    return Ds * Dm_inverse;
+  }
+
+  // Gradient of the shape function of vertex a = 1, 2, 3; that of vertex 0 is minus their sum.
+  Vec3<V> shape_gradient(int a) const { return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)}; }
+};
+
+template <class M, class V>
+M load_material(const ChunkData& chunk, std::int64_t pack, int lane) {
+  V parameters[M::parameter_count];
+  for (int k = 0; k < M::parameter_count; ++k)
+    parameters[k] = V::load_aligned(chunk.parameters + (pack * M::parameter_count + k) * kLanes + lane);
+  return M(parameters);
+}
+
+// visit(tets, material) for every vector of elements of the chunk, in order.
+template <class V, template <class> class M, class Visit>
+void for_each_tets(const ChunkData& chunk, const Visit& visit) {
+  for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
+    for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size))
+      visit(Tets<V>(chunk, pack, lane), load_material<M<V>, V>(chunk, pack, lane));
+}
+
+// The chunk's own copy of its node positions, padded to 4 doubles a node.
+static inline void load_positions(const ChunkData& chunk, const double* x, double* positions) {
+  for (std::int64_t s = 0; s < chunk.slots; ++s)
+    for (int c = 0; c < 3; ++c) positions[4 * s + c] = x[3 * static_cast<std::int64_t>(chunk.slot_node[s]) + c];
+}
+
+static inline void set_zero(double* values, std::int64_t count) {
+  for (std::int64_t k = 0; k < count; ++k) values[k] = 0.0;
+}
+
+template <class V, template <class> class M>
+double chunk_value(const ChunkData& chunk, const double* x, double* positions) {
+  load_positions(chunk, x, positions);
+  V total(0.0);
+  for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
+    total += tets.volume * material.energy(tets.deformation_gradient(positions));
+  });
+  return xsimd::hadd(total);
+}
+
+template <class V, template <class> class M>
+double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions, double* slot_gradient) {
+  load_positions(chunk, x, positions);
+  set_zero(slot_gradient, 3 * chunk.slots);
+  V total(0.0);
+  for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
+    const Mat3<V> F = tets.deformation_gradient(positions);
+    total += tets.volume * material.energy(F);
+    const Mat3<V> P = material.stress(F);
+    Vec3<V> force[4];  // dE/dx_a = volume P grad N_a
+    for (int i = 0; i < 3; ++i) force[0][i] = V(0.0);
+    for (int a = 1; a < 4; ++a) {
+      const Vec3<V> b = tets.shape_gradient(a);
+      for (int i = 0; i < 3; ++i) {
+        force[a][i] = tets.volume * (P(i, 0) * b[0] + P(i, 1) * b[1] + P(i, 2) * b[2]);
+        force[0][i] -= force[a][i];
+      }
+    }
+    for (int a = 0; a < 4; ++a) scatter_add<V, 3>(force[a].data(), tets.vertex + a * kLanes, slot_gradient);
+  });
+  return xsimd::hadd(total);
+}
+
+// H_ab = volume sum_kl (grad N_a)_k C_(ik)(jl) (grad N_b)_l for the six pairs of vertices 1, 2, 3.
+template <class V>
+void contract_stiffness(const Stiffness9<V>& C, const Tets<V>& tets, Mat3<V> (&H)[3][3]) {
+  for (int b = 0; b < 3; ++b) {
+    const Vec3<V> gb = tets.shape_gradient(b + 1);
+    V T[9][3];
+    for (int p = 0; p < 9; ++p)
+      for (int j = 0; j < 3; ++j) T[p][j] = C.c[p][3 * j] * gb[0] + C.c[p][3 * j + 1] * gb[1] + C.c[p][3 * j + 2] * gb[2];
+    for (int a = 0; a <= b; ++a) {
+      const Vec3<V> ga = tets.shape_gradient(a + 1);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          H[a][b](i, j) = tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
+    }
+  }
+}
+
+template <class V>
+Spectrum<V> project_psd(Spectrum<V> H) {
+  H.scaling = project_psd(H.scaling);
+  for (int k = 0; k < 3; ++k) {
+    H.twist[k] = xsimd::max(H.twist[k], V(0.0));
+    H.flip[k] = xsimd::max(H.flip[k], V(0.0));
+  }
+  return H;
+}
+
+// The same blocks from a spectrum: contract in the frame of the SVD, where C is sparse, and turn each block back.
+template <class V>
+void contract_spectrum(const Spectrum<V>& S, const Svd3<V>& svd, const Tets<V>& tets, Mat3<V> (&H)[3][3]) {
+  V same[3], mixed[3];  // C_(ij)(ij) and C_(ij)(ji), at the index left out
+  for (int k = 0; k < 3; ++k) {
+    same[k] = V(0.5) * (S.flip[k] + S.twist[k]);
+    mixed[k] = V(0.5) * (S.flip[k] - S.twist[k]);
+  }
+  Vec3<V> g[3];
+  for (int a = 0; a < 3; ++a) g[a] = transpose_times(svd.R, tets.shape_gradient(a + 1));
+  for (int b = 0; b < 3; ++b)
+    for (int a = 0; a <= b; ++a) {
+      Mat3<V> local;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          if (i == j) {
+            const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+            local(i, i) = S.scaling(i, i) * g[a][i] * g[b][i] + same[i2] * g[a][i1] * g[b][i1] +
+                          same[i1] * g[a][i2] * g[b][i2];
+          } else {
+            local(i, j) = S.scaling(i, j) * g[a][i] * g[b][j] + mixed[3 - i - j] * g[a][j] * g[b][i];
+          }
+          local(i, j) *= tets.volume;
+        }
+      const Mat3<V> left = svd.U * local;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          H[a][b](i, j) = left(i, 0) * svd.U(j, 0) + left(i, 1) * svd.U(j, 1) + left(i, 2) * svd.U(j, 2);
+    }
+}
+
+// Adds the ten blocks (b, a), a <= b, of each element; those of vertex 0 follow from the other six.
+template <class V>
+void scatter_blocks(const Tets<V>& tets, const Mat3<V> (&H)[3][3], double* slot_blocks) {
+  Mat3<V> first[4];  // block (a, 0), a = 0..3
+  const auto entry = [&](int a, int b, int i, int j) { return a <= b ? H[a][b](i, j) : H[b][a](j, i); };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      first[0](i, j) = V(0.0);
+      for (int a = 0; a < 3; ++a) {
+        first[a + 1](i, j) = -(entry(a, 0, i, j) + entry(a, 1, i, j) + entry(a, 2, i, j));
+        first[0](i, j) -= first[a + 1](i, j);
+      }
+    }
+  int pair = 0;
+  for (int a = 0; a < 4; ++a) scatter_add<V, 9>(&first[a].m[0][0], tets.pair + pair++ * kLanes, slot_blocks);
+  for (int a = 0; a < 3; ++a)
+    for (int b = a; b < 3; ++b) {
+      Mat3<V> lower;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) lower(i, j) = H[a][b](j, i);
+      scatter_add<V, 9>(&lower.m[0][0], tets.pair + pair++ * kLanes, slot_blocks);
+    }
+}
+
+template <class V, template <class> class M>
+void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double* positions, double* slot_blocks) {
+  load_positions(chunk, x, positions);
+  set_zero(slot_blocks, 9 * chunk.block_slots);
+  for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
+    const Mat3<V> F = tets.deformation_gradient(positions);
+    Mat3<V> H[3][3];
+    if (project) {
+      const Svd3<V> svd = svd3(F);
+      contract_spectrum(project_psd(material.spectrum(svd.sigma)), svd, tets, H);
+    } else {
+      contract_stiffness(material.stiffness(F), tets, H);
+    }
+    scatter_blocks(tets, H, slot_blocks);
+  });
+}
+
+// C = sum over the frame of the SVD, as a full 9x9 matrix.
+template <class V>
+Stiffness9<V> expand_spectrum(const Spectrum<V>& S, const Svd3<V>& svd) {
+  Stiffness9<V> C;
+  for (auto& row : C.c)
+    for (V& c : row) c = V(0.0);
+  const auto add = [&](const V& weight, int i, int k, int j, int l) {
+    for (int p = 0; p < 9; ++p)
+      for (int q = 0; q < 9; ++q)
+        C.c[p][q] += weight * (svd.U(p / 3, i) * svd.R(p % 3, k)) * (svd.U(q / 3, j) * svd.R(q % 3, l));
+  };
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      add(S.scaling(i, j), i, i, j, j);
+      if (i == j) continue;
+      const int k = 3 - i - j;
+      add(V(0.5) * (S.flip[k] + S.twist[k]), i, j, i, j);
+      add(V(0.5) * (S.flip[k] - S.twist[k]), i, j, j, i);
+    }
+  return C;
+}
+
+template <class V, template <class> class M>
+void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy, double* stress,
+                   double* stiffness) {
+  for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
+    Mat3<V> F;
+    for (int k = 0; k < 9; ++k) F(k / 3, k % 3) = V::load_unaligned(F_lanes + k * kLanes + lane);
+    V parameters[M<V>::parameter_count];
+    for (int k = 0; k < M<V>::parameter_count; ++k) parameters[k] = V::load_unaligned(parameter_lanes + k * kLanes + lane);
+    const M<V> material(parameters);
+    material.energy(F).store_unaligned(energy + lane);
+    const Mat3<V> P = material.stress(F);
+    for (int k = 0; k < 9; ++k) P(k / 3, k % 3).store_unaligned(stress + k * kLanes + lane);
+    const Svd3<V> svd = svd3(F);
+    const Stiffness9<V> C =
+        project ? expand_spectrum(project_psd(material.spectrum(svd.sigma)), svd) : material.stiffness(F);
+    for (int k = 0; k < 81; ++k) C.c[k / 9][k % 9].store_unaligned(stiffness + k * kLanes + lane);
+  }
+}
+
+template <class V, template <class> class M>
+MaterialKernels make_kernels() {
+  return {M<V>::name,          M<V>::parameter_count, chunk_value<V, M>, chunk_value_gradient<V, M>,
+          chunk_hessian<V, M>, lanes_density<V, M>};
+}
+
+}  // namespace qlb

@@ -1,0 +1,42 @@
+// The doors between the element kernels, compiled once per SIMD level, and everything else.
+#pragma once
+
+#include <cstdint>
+
+namespace qlb {
+
+// One chunk of TetBlocks, as plain pointers.
+struct ChunkData {
+  const std::int64_t* vertex;
+  const std::int32_t* pair;
+  const double* shape;
+  const double* volume;
+  const double* parameters;
+  std::int64_t packs;
+  const std::int32_t* slot_node;
+  std::int64_t slots;
+  std::int64_t block_slots;
+};
+
+// Kernels of one material at one SIMD level. `scratch` holds 4 * slots doubles.
+struct MaterialKernels {
+  const char* name;
+  int parameter_count;
+  double (*value)(const ChunkData&, const double* x, double* scratch);
+  // slot_gradient: (slots, 3), overwritten
+  double (*value_gradient)(const ChunkData&, const double* x, double* scratch, double* slot_gradient);
+  // slot_blocks: (block_slots, 3, 3), overwritten
+  void (*hessian)(const ChunkData&, const double* x, bool project, double* scratch, double* slot_blocks);
+  // The density itself at kLanes deformation gradients: F (9, kLanes), parameters (count, kLanes) ->
+  // energy (kLanes), stress (9, kLanes), stiffness (81, kLanes)
+  void (*density)(const double* F, const double* parameters, bool project, double* energy, double* stress,
+                  double* stiffness);
+};
+
+// All materials at one level, ended by an entry whose name is null.
+const MaterialKernels* kernels_SSE2();
+const MaterialKernels* kernels_AVX2();
+const MaterialKernels* kernels_AVX512();
+const MaterialKernels* kernels_NEON64();
+
+}  // namespace qlb

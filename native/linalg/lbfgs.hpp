@@ -1,0 +1,38 @@
+// Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "linalg/cholesky.hpp"
+#include "simd/aligned.hpp"
+
+namespace qlb {
+
+class Lbfgs {
+ public:
+  Lbfgs(std::int64_t size, int window, int threads);
+
+  void clear() { count_ = 0; }
+  int pairs() const { return count_; }
+  // Stores s = x - x_old, y = g - g_old; skipped (false) where s.y <= 1e-12 |s||y|: the curvature must be positive.
+  bool push(const double* x_old, const double* x, const double* g_old, const double* g);
+  // p = -H g, H the quasi-Newton inverse over `inner`. Returns g.p, the slope along p.
+  double direction(const double* g, InverseOperator& inner, double* p);
+
+  std::int64_t size() const { return size_; }
+
+ private:
+  double* s(int k) { return pairs_.data() + (2 * slot(k)) * size_; }
+  double* y(int k) { return pairs_.data() + (2 * slot(k) + 1) * size_; }
+  std::int64_t slot(int k) const { return (first_ + k) % window_; }  // k = 0 is the oldest
+
+  std::int64_t size_;
+  int window_, threads_;
+  int first_ = 0, count_ = 0;
+  Aligned<double> pairs_;  // (window, 2, size)
+  std::vector<double> curvature_, alpha_;
+  Aligned<double> work_;
+};
+
+}  // namespace qlb

@@ -1,0 +1,26 @@
+// Arrays aligned to a cache line, for SIMD loads.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+namespace qlb {
+
+template <class T>
+struct CacheLineAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t alignment{64};
+  CacheLineAllocator() = default;
+  template <class U>
+  CacheLineAllocator(const CacheLineAllocator<U>&) {}
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
+  void deallocate(T* p, std::size_t) { ::operator delete(p, alignment); }
+  template <class U>
+  bool operator==(const CacheLineAllocator<U>&) const { return true; }
+};
+
+template <class T>
+using Aligned = std::vector<T, CacheLineAllocator<T>>;
+
+}  // namespace qlb

@@ -1,0 +1,30 @@
+"""qlb: fast, dependable time integration of hyperelastic solids."""
+
+from importlib.metadata import version as _version
+
+from qlb.errors import InputError, QlbError, StepFailed
+from qlb.integrators import State
+from qlb.materials import StableNeoHookean
+from qlb.mesh import TetMesh
+from qlb.simulation import Simulation, StepResult
+from qlb.solvers import Reason, SolverSettings, Tolerance
+from qlb.system import Rotation, Translation
+
+__version__ = _version("qlb")
+
+__all__ = [
+    "InputError",
+    "QlbError",
+    "Reason",
+    "Rotation",
+    "Simulation",
+    "SolverSettings",
+    "StableNeoHookean",
+    "State",
+    "StepFailed",
+    "StepResult",
+    "TetMesh",
+    "Tolerance",
+    "Translation",
+    "__version__",
+]

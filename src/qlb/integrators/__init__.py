@@ -1,0 +1,16 @@
+"""Time integrators. Each supplies the stages of a step, (c, x_b, v_b), and its start-up; nothing else."""
+
+from qlb.integrators.bdf import BDF1, BDF2
+from qlb.integrators.integrator import Integrator, Stage, State
+from qlb.integrators.quasistatic import Quasistatic
+from qlb.integrators.sdirk2 import SDIRK2
+
+INTEGRATORS: dict[str, type[Integrator]] = {
+    "BDF1": BDF1,
+    "BDF2": BDF2,
+    "SDIRK2": SDIRK2,
+    "quasistatic": Quasistatic,
+}
+"""Every integrator by the name that scene files and the command line use."""
+
+__all__ = ["BDF1", "BDF2", "INTEGRATORS", "SDIRK2", "Integrator", "Quasistatic", "Stage", "State"]

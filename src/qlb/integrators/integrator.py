@@ -1,0 +1,64 @@
+"""States, stages, and what an integrator is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from qlb.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class State:
+    """Positions and velocities at a time, and the state one step earlier where there is one."""
+
+    time: float
+    """[s]"""
+    positions: FloatArray
+    """[m], shape (n, 3)"""
+    velocities: FloatArray
+    """[m/s], shape (n, 3)"""
+    previous: State | None = None
+
+    def without_history(self) -> State:
+        """The same state with no previous one."""
+        return State(self.time, self.positions, self.velocities)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One implicit stage: find x with M (x - x_b - c v_b) = c^2 f(x, (x - x_b)/c)."""
+
+    time: float
+    """Where the loads and the held nodes are taken [s]."""
+    c: float
+    """[s]"""
+    x_b: FloatArray
+    """[m], shape (n, 3)"""
+    v_b: FloatArray
+    """[m/s], shape (n, 3)"""
+    inertial: bool = True
+    """False in quasistatics, where the stage is f(x) = 0."""
+
+    def velocity(self, x: FloatArray) -> FloatArray:
+        """v = (x - x_b)/c [m/s]."""
+        return (x - self.x_b) / self.c
+
+
+Steps = Generator[Stage, FloatArray, tuple[FloatArray, FloatArray]]
+"""Yields each stage of a step, is sent the positions that solve it, returns positions and velocities at the end."""
+
+
+class Integrator(ABC):
+    """A time integrator; it knows no energy and no solver."""
+
+    name: str
+
+    @abstractmethod
+    def step(self, state: State, h: float) -> Steps:
+        """The stages of one step of `h` [s] from `state`."""
+
+    def one_step_method(self) -> Integrator:
+        """An integrator of the same order that needs no earlier state: for starting, and for steps cut in half."""
+        return self

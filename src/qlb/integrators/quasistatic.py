@@ -1,0 +1,17 @@
+"""A sequence of equilibria under loads and held nodes that change with time."""
+
+from __future__ import annotations
+
+from qlb.integrators.integrator import Integrator, Stage, State, Steps
+
+
+class Quasistatic(Integrator):
+    """f(x) = 0 at each time (supplement, eqs. 5-6): no inertia, no damping."""
+
+    name = "quasistatic"
+
+    def step(self, state: State, h: float) -> Steps:
+        """One stage without inertia; the velocity returned is the mean over the step."""
+        stage = Stage(state.time + h, h, state.positions, state.velocities, inertial=False)
+        x = yield stage
+        return x, stage.velocity(x)

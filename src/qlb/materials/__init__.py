@@ -1,0 +1,9 @@
+"""Hyperelastic materials. Each is one class here and one header in native/materials."""
+
+from qlb.materials.material import IsotropicMaterial, Material
+from qlb.materials.stable_neo_hookean import StableNeoHookean
+
+MATERIALS: dict[str, type[IsotropicMaterial]] = {"SNH": StableNeoHookean}
+"""Every material by the name that scene files use."""
+
+__all__ = ["MATERIALS", "IsotropicMaterial", "Material", "StableNeoHookean"]

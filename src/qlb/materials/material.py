@@ -1,0 +1,88 @@
+"""What every material has: its parameters with units and ranges, and its energy density at given F."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from qlb import _native
+from qlb.arrays import FloatArray, vector
+from qlb.errors import InputError
+from qlb.settings import PerElement, Settings, quantity
+
+
+class Material(Settings):
+    """A hyperelastic solid: an energy density psi(F) [Pa] and a mass density.
+
+    Any parameter may be one number or an array with one value per element.
+    """
+
+    name: ClassVar[str]
+    """Short name, as in scene files; also the name of the compiled kernels."""
+
+    density: PerElement = quantity(1000.0, "Mass density", unit="kg/m^3", gt=0)
+
+    @abstractmethod
+    def kernel_parameters(self) -> tuple[PerElement, ...]:
+        """The constants that the compiled kernels take, in their order."""
+
+    @abstractmethod
+    def modulus(self) -> PerElement:
+        """A stiffness [Pa] that stands for the material where a scale is needed, such as Young's modulus."""
+
+    def parameter_table(self, elements: int) -> FloatArray:
+        """`kernel_parameters` for each element, shape (elements, count).
+
+        Raises:
+            InputError: a parameter array whose length is not `elements`.
+        """
+        columns = [per_element(self, value, elements) for value in self.kernel_parameters()]
+        return np.ascontiguousarray(np.stack(columns, axis=1))
+
+    def evaluate(
+        self, F: npt.ArrayLike, *, project: bool = False, simd_level: str = ""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Energy density and its derivatives at deformation gradients.
+
+        Args:
+            F: deformation gradients, shape (k, 3, 3).
+            project: give the nearest positive semidefinite second derivative instead of the exact one.
+            simd_level: which compiled level to use; empty for the best of this machine.
+
+        Returns:
+            psi [Pa], shape (k,); first Piola-Kirchhoff stress dpsi/dF [Pa], shape (k, 3, 3); d2psi/dF2 [Pa], shape
+            (k, 9, 9), with F flattened row by row.
+        """
+        F = np.ascontiguousarray(F, dtype=np.float64).reshape(-1, 3, 3)
+        count = len(F)
+        psi, P, C = np.empty(count), np.empty((count, 3, 3)), np.empty((count, 9, 9))
+        _native.evaluate_density(self.name, F, self.parameter_table(count), project, psi, P, C, simd_level)
+        return psi, P, C
+
+
+class IsotropicMaterial(Material):
+    """An isotropic material given by Young's modulus and Poisson's ratio."""
+
+    young: PerElement = quantity(2e4, "Young's modulus", unit="Pa", gt=0)
+    poisson: PerElement = quantity(0.49, "Poisson's ratio", gt=-1, lt=0.5)
+
+    def modulus(self) -> PerElement:
+        """Young's modulus [Pa]."""
+        return self.young
+
+    def lame(self) -> tuple[PerElement, PerElement]:
+        """Lame's constants (mu, lambda) [Pa] of linear elasticity."""
+        mu = self.young / (2 * (1 + self.poisson))
+        return mu, self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+
+
+def per_element(material: Material, value: PerElement, elements: int) -> FloatArray:
+    """`value` as an array over `elements`. Raises `InputError` where an array has another length."""
+    if np.ndim(value) and np.shape(value) != (elements,):
+        raise InputError(
+            f"a parameter of material {material.name} has shape {np.shape(value)}, must be one number or ({elements},)"
+        )
+    return vector(value, (elements,))

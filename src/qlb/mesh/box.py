@@ -1,0 +1,42 @@
+"""A box of Kuhn tetrahedra."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+
+from qlb.errors import InputError
+from qlb.mesh.tet_mesh import TetMesh, signed_volumes
+
+
+def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> TetMesh:
+    """A box from the origin to `size` [m] with `cells` cells along each axis.
+
+    Each cell is cut into the six Kuhn tetrahedra (Kuhn 1960), one for each order of the axes in which a path along
+    edges can climb from a corner to the opposite one. Neighbouring cells are mirror images, which makes the mesh
+    conforming and symmetric.
+
+    Raises:
+        InputError: a size that is not > 0, or a cell count that is not a whole number >= 1.
+    """
+    if len(size) != 3 or not all(np.isfinite(s) and s > 0 for s in size):
+        raise InputError(f"box size {tuple(size)} is out of range: three lengths > 0 m")
+    if len(cells) != 3 or not all(int(c) == c and c >= 1 for c in cells):
+        raise InputError(f"box cells {tuple(cells)} are out of range: three whole numbers >= 1")
+
+    counts = [int(c) for c in cells]
+    axes = [np.linspace(0.0, length, count + 1) for length, count in zip(size, counts, strict=True)]
+    positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
+    cell = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    mirrored = cell % 2 == 1
+
+    def corner(offset: np.ndarray) -> np.ndarray:
+        return np.asarray((cell + np.where(mirrored, 1 - offset, offset)) @ strides)
+
+    paths = [np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(order)]]), axis=0) for order in permutations(range(3))]
+    tets = np.stack([np.stack([corner(offset) for offset in path], axis=-1) for path in paths], axis=1).reshape(-1, 4)
+    negative = signed_volumes(positions, tets.astype(np.int32)) < 0
+    tets[negative, 2:] = tets[negative, :1:-1]
+    return TetMesh(positions, tets)

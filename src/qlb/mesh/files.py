@@ -1,0 +1,32 @@
+"""Reading tetrahedral meshes from files, through meshio."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from qlb.errors import InputError
+from qlb.mesh.tet_mesh import TetMesh
+
+
+def read_tet_mesh(path: Path) -> TetMesh:
+    """The tetrahedra of a mesh file; see `TetMesh.read`."""
+    import meshio
+
+    if not path.is_file():
+        raise InputError(f"mesh file {path} does not exist")
+    try:
+        data = meshio.read(path)
+    except (meshio.ReadError, SystemExit, ValueError, KeyError, IndexError, OSError, AssertionError) as error:
+        reason = str(error).strip().splitlines()
+        raise InputError(f"mesh file {path} cannot be read: {reason[0] if reason else type(error).__name__}") from None
+    cells = [block.data for block in data.cells if block.type == "tetra"]
+    if not cells:
+        kinds = sorted({block.type for block in data.cells}) or ["nothing"]
+        raise InputError(f"mesh file {path} has no tetrahedra, only {', '.join(kinds)}")
+    tets = np.vstack(cells)
+    used, renumbered = np.unique(tets, return_inverse=True)
+    if used[0] < 0 or used[-1] >= len(data.points):
+        raise InputError(f"mesh file {path}: node index {used[-1] if used[0] >= 0 else used[0]} is outside its {len(data.points)} nodes")
+    return TetMesh(np.asarray(data.points, dtype=np.float64)[used, :3], renumbered.reshape(-1, 4))

@@ -1,0 +1,133 @@
+"""The tetrahedral mesh that every simulation starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from qlb.arrays import BoolArray, FloatArray, IntArray
+from qlb.errors import InputError
+
+# A tet counts as flat when its volume is below this fraction of its longest edge cubed (a regular one has 0.118).
+FLAT = 1e-10
+
+
+class TetMesh:
+    """Linear tetrahedra at rest, checked when made.
+
+    Attributes:
+        positions: rest positions [m], shape (n, 3), float64.
+        tets: node indices, shape (m, 4), int32, positively oriented: det(x1 - x0, x2 - x0, x3 - x0) > 0.
+
+    Raises:
+        InputError: a NaN position, an index out of range, a tet that names a node twice, is flat or inverted, a node
+            that no tet uses. The message names the first such tet or node.
+    """
+
+    def __init__(self, positions: npt.ArrayLike, tets: npt.ArrayLike) -> None:
+        x = np.ascontiguousarray(positions, dtype=np.float64)
+        t = np.asarray(tets)
+        if x.ndim != 2 or x.shape[1] != 3:
+            raise InputError(f"positions have shape {x.shape}, must be (n, 3)")
+        if t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
+            raise InputError(f"tets have shape {t.shape}, must be (m, 4) with m >= 1")
+        if not np.issubdtype(t.dtype, np.integer):
+            raise InputError(f"tets have type {t.dtype}, must be integers")
+        _check_indices(t, len(x))
+        self.positions: FloatArray = x
+        self.tets: IntArray = np.ascontiguousarray(t, dtype=np.int32)
+        _check_geometry(self)
+        self.positions.setflags(write=False)
+        self.tets.setflags(write=False)
+
+    @staticmethod
+    def box(
+        size: tuple[float, float, float] = (1.0, 0.25, 0.25), *, cells: tuple[int, int, int] = (20, 5, 5)
+    ) -> TetMesh:
+        """A box from the origin to `size` [m], cut in cells of 6 Kuhn tets, mirrored from cell to cell."""
+        from qlb.mesh.box import box_mesh
+
+        return box_mesh(size, cells)
+
+    @staticmethod
+    def read(path: str | Path) -> TetMesh:
+        """Read the tetrahedra of a mesh file in any format that meshio knows (gmsh, VTK, Medit, ...).
+
+        Nodes that no tetrahedron uses are dropped.
+
+        Raises:
+            InputError: the file is missing, unreadable, has no tetrahedra, or fails the checks of `TetMesh`.
+        """
+        from qlb.mesh.files import read_tet_mesh
+
+        return read_tet_mesh(Path(path))
+
+    def nodes_where(self, condition: Callable[[FloatArray], BoolArray]) -> IntArray:
+        """Indices of the nodes whose rest positions meet `condition`: (n, 3) positions [m] -> (n,) booleans."""
+        return np.flatnonzero(condition(self.positions)).astype(np.int32)
+
+    def volumes(self) -> FloatArray:
+        """Signed rest volumes [m^3], shape (m,)."""
+        return signed_volumes(self.positions, self.tets)
+
+    def boundary_triangles(self) -> IntArray:
+        """Faces that belong to one tet only, outward oriented, shape (k, 3)."""
+        faces = self.tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+        return np.ascontiguousarray(faces[np.sort(first[count == 1])])
+
+    def edge_lengths(self) -> FloatArray:
+        """Lengths [m] of the six edges of each tet, shape (m, 6)."""
+        corners = self.positions[self.tets]
+        a, b = np.triu_indices(4, k=1)
+        return np.asarray(np.linalg.norm(corners[:, a] - corners[:, b], axis=2), dtype=np.float64)
+
+
+def signed_volumes(positions: FloatArray, tets: IntArray) -> FloatArray:
+    """det(x1 - x0, x2 - x0, x3 - x0) / 6 of each tet [m^3], shape (m,)."""
+    corners = positions[tets]
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0)
+
+
+def _check_indices(tets: npt.NDArray[np.integer], nodes: int) -> None:
+    outside = (tets < 0) | (tets >= nodes)
+    if outside.any():
+        e, a = np.argwhere(outside)[0]
+        raise InputError(f"tet {e} names node {tets[e, a]}, must be in [0, {nodes - 1}]")
+    ordered = np.sort(tets, axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if twice.any():
+        e = int(np.argmax(twice))
+        raise InputError(f"tet {e} names a node twice: {tets[e].tolist()}, its four nodes must differ")
+
+
+def _check_geometry(mesh: TetMesh) -> None:
+    bad = ~np.isfinite(mesh.positions).all(axis=1)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise InputError(f"node {i} has position {mesh.positions[i].tolist()}, must be finite")
+    volume = mesh.volumes()
+    scale = mesh.edge_lengths().max(axis=1) ** 3
+    flat = np.abs(volume) <= FLAT * scale
+    if flat.any():
+        e = int(np.argmax(flat))
+        raise InputError(
+            f"tet {e} is flat: volume {volume[e]:.3g} m^3, must be > {FLAT:g} of its longest edge cubed"
+            f" ({FLAT * scale[e]:.3g} m^3); nodes {mesh.tets[e].tolist()}"
+        )
+    if (volume < 0).any():
+        e = int(np.argmax(volume < 0))
+        raise InputError(
+            f"tet {e} is inverted: volume {volume[e]:.3g} m^3, must be > 0; nodes {mesh.tets[e].tolist()}"
+            f" ({np.count_nonzero(volume < 0)} of {len(volume)} tets are inverted)"
+        )
+    used = np.zeros(len(mesh.positions), dtype=bool)
+    used[mesh.tets] = True
+    if not used.all():
+        raise InputError(
+            f"node {int(np.argmin(used))} belongs to no tet ({np.count_nonzero(~used)} such nodes); each node must be used"
+        )

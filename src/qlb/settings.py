@@ -1,0 +1,154 @@
+"""Settings models: one definition gives the Python arguments, the scene keys, the errors and the schema."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic._internal._model_construction import ModelMetaclass
+from pydantic.fields import FieldInfo
+
+from qlb.arrays import FloatArray
+from qlb.errors import InputError
+
+PerElement = float | FloatArray
+"""One value for all elements, or an array with one value per element."""
+
+_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+
+
+def quantity(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    gt: float | None = None,
+    ge: float | None = None,
+    lt: float | None = None,
+    le: float | None = None,
+) -> Any:
+    """A number (or an array of them, for a `PerElement` field) with its unit and allowed range."""
+    bounds = {"gt": gt, "ge": ge, "lt": lt, "le": le}
+    extra: dict[str, Any] = {"unit": unit, "bounds": {k: v for k, v in bounds.items() if v is not None}}
+    return Field(default, description=description, json_schema_extra=extra)
+
+
+def describe_range(bounds: Mapping[str, float], unit: str = "") -> str:
+    """The allowed range in words, such as "> -1 and < 0.5" or "finite"."""
+    text = " and ".join(f"{_BOUNDS[name]} {limit:g}" for name, limit in bounds.items()) or "finite"
+    return f"{text} {unit}".strip()
+
+
+class _RaisesInputError(ModelMetaclass):
+    """Turns pydantic's errors into `InputError` where a user constructs a model."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as error:
+            raise InputError(_one_line(cls, error)) from None  # type: ignore[arg-type]
+
+
+class Settings(BaseModel, metaclass=_RaisesInputError):
+    """Base of every settings model: immutable, refuses unknown keys, checks ranges, raises `InputError`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, validate_default=False)
+
+    @classmethod
+    def parse(cls, data: Mapping[str, Any]) -> Self:
+        """Build from plain data, such as a parsed scene file. Raises `InputError` naming the key."""
+        try:
+            return cls.model_validate(dict(data))
+        except ValidationError as error:
+            raise InputError(_one_line(cls, error)) from None
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _check_range(cls, value: Any, info: ValidationInfo) -> Any:
+        field = cls.model_fields[str(info.field_name)]
+        extra = field.json_schema_extra
+        if not isinstance(extra, dict) or "bounds" not in extra or value is None:
+            return value
+        bounds: Any = extra["bounds"]
+        numbers = _as_numbers(value)
+        bad = ~np.isfinite(numbers)
+        for name, limit in bounds.items():
+            bad |= ~_satisfies(name, numbers, limit)
+        if bad.any():
+            where = "" if numbers.ndim == 0 else f" at index {int(np.argmax(bad))}"
+            first = float(numbers[bad][0]) if numbers.ndim else float(numbers)
+            raise ValueError(f"{first:g}{where} is out of range: must be {describe_range(bounds, str(extra['unit']))}")
+        return numbers if numbers.ndim else float(numbers) if field.annotation is not int else value
+
+
+def _as_numbers(value: Any) -> FloatArray:
+    if isinstance(value, bool):
+        raise ValueError(f"{value!r} is not a number")
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{value!r} is not a number") from None
+
+
+def _satisfies(name: str, numbers: FloatArray, limit: float) -> Any:
+    with np.errstate(invalid="ignore"):
+        return {
+            "gt": np.greater,
+            "ge": np.greater_equal,
+            "lt": np.less,
+            "le": np.less_equal,
+        }[name](numbers, limit)
+
+
+
+
+def _one_line(model: type[BaseModel], error: ValidationError) -> str:
+    """The first problem of a ValidationError in one line, and how many there are."""
+    problems = error.errors()
+    first = problems[0]
+    location = [str(part) for part in first["loc"]]
+    key = ".".join(location) or model.__name__
+    if first["type"] == "extra_forbidden":
+        text = unknown_key(model, key)
+    else:
+        message = first["msg"].removeprefix("Value error, ")
+        own_words = first["type"] == "value_error"
+        text = f"{key}: {message}" if own_words else f"{key} = {_short(first['input'])}: {message}"
+    more = len(problems) - 1
+    return text if more == 0 else f"{text} (and {more} more)"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def unknown_key(model: type[BaseModel], key: str) -> str:
+    """The error for a key that `model` does not have, with the nearest that it has."""
+    valid = list(key_fields(model))
+    near = difflib.get_close_matches(key, valid, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(valid)}"
+    return f"unknown key '{key}'; {hint}"
+
+
+def key_fields(model: type[BaseModel], prefix: str = "") -> dict[str, FieldInfo]:
+    """Every key of a settings model, dotted, with its field: `{"mesh.size": ..., "step": ...}`."""
+    fields: dict[str, FieldInfo] = {}
+    for name, field in model.model_fields.items():
+        inner = _nested_model(field.annotation)
+        if inner is None:
+            fields[prefix + name] = field
+        else:
+            fields |= key_fields(inner, f"{prefix}{name}.")
+    return fields
+
+
+def _nested_model(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return None
+
+

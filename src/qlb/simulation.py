@@ -1,0 +1,271 @@
+"""The time loop, and the one door for scripts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from qlb.arrays import FloatArray, vector
+from qlb.errors import InputError, StepFailed
+from qlb.integrators import INTEGRATORS, Integrator, State
+from qlb.materials.material import Material
+from qlb.mesh.tet_mesh import TetMesh
+from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
+from qlb.system import HeldNodes, Motion, StageProblem, System
+from qlb.system.system import Gravity, MassKind
+from qlb.timing import Timer
+
+T = TypeVar("T")
+OnFailure = Literal["stop", "halve", "accept"]
+MAX_HALVINGS = 8
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """One time step."""
+
+    step: int
+    """1 for the first"""
+    time: float
+    """at the end of the step [s]"""
+    positions: FloatArray
+    """[m], shape (n, 3)"""
+    velocities: FloatArray
+    """[m/s], shape (n, 3)"""
+    solves: list[SolveResult] = field(repr=False)
+    """one for each stage, or for each stage of each part of a step that was cut"""
+    parts: int = 1
+    """1, or how many pieces the step was cut into because the whole did not converge"""
+
+    @property
+    def converged(self) -> bool:
+        """Whether every solve that led to `positions` met the tolerance."""
+        return self.reason.converged
+
+    @property
+    def reason(self) -> Reason:
+        """Why the last solve ended, or the first that failed (of the pieces, where the step was cut)."""
+        used = self.solves[-1:] if self.parts > 1 else self.solves
+        return next((s.reason for s in used if not s.reason.converged), self.solves[-1].reason)
+
+    @property
+    def iterations(self) -> int:
+        """Nonlinear iterations of all solves."""
+        return sum(solve.iterations for solve in self.solves)
+
+    @property
+    def factorizations(self) -> int:
+        """Cholesky factorisations of all solves."""
+        return sum(solve.factorizations for solve in self.solves)
+
+
+class Simulation:
+    """One elastic body, integrated through time.
+
+    Args:
+        mesh: the body at rest; it starts there.
+        material: a hyperelastic material.
+        integrator: "BDF1", "BDF2", "SDIRK2" or "quasistatic".
+        solver: "ND", "QLF" or "QLB".
+        step: h [s], > 0.
+        gravity: acceleration [m/s^2], shape (3,), or a function of time [s] that gives it.
+        velocity: initial velocity [m/s], shape (3,) or (n, 3).
+        mass: "lumped" or "consistent".
+        mass_damping: Rayleigh's alpha [1/s], >= 0: a force -alpha M v.
+        tolerance: when a solve has converged.
+        solver_settings: settings of the solver.
+        on_failure: what to do about a step that does not converge: "stop" raises `StepFailed`; "halve" takes it in two
+            halves, and those again, down to h/256, before it raises; "accept" goes on from where it ended, marked as
+            not converged.
+        threads: for the kernels and BLAS; all that this process may use if None.
+
+    Raises:
+        InputError: an argument is out of range; the message names it.
+    """
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        *,
+        material: Material,
+        integrator: str = "BDF2",
+        solver: str = "QLB",
+        step: float = 1e-2,
+        gravity: Gravity = (0.0, -9.81, 0.0),
+        velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+        mass: MassKind = "lumped",
+        mass_damping: float = 0.0,
+        tolerance: Tolerance | None = None,
+        solver_settings: SolverSettings | None = None,
+        on_failure: OnFailure = "stop",
+        threads: int | None = None,
+    ) -> None:
+        self._integrator = _choose("integrator", integrator, INTEGRATORS)()
+        self._solver_class = _choose("solver", solver, SOLVERS)
+        _require("step", step, "> 0 s", np.isfinite(step) and step > 0)
+        _require("mass_damping", mass_damping, ">= 0 1/s", np.isfinite(mass_damping) and mass_damping >= 0)
+        _require("mass", mass, "'lumped' or 'consistent'", mass in ("lumped", "consistent"))
+        _require("on_failure", on_failure, "'stop', 'halve' or 'accept'", on_failure in ("stop", "halve", "accept"))
+        _require("threads", threads, ">= 1", threads is None or threads >= 1)
+        self.mesh = mesh
+        self.material = material
+        self.step = float(step)
+        self.gravity = gravity
+        self.mass: MassKind = mass
+        self.mass_damping = float(mass_damping)
+        self.tolerance = tolerance or Tolerance()
+        self.solver_settings = solver_settings or SolverSettings()
+        self.on_failure: OnFailure = on_failure
+        self.threads = threads or available_threads()
+        self.timer = Timer()
+        self._held = HeldNodes(len(mesh.positions))
+        self._steps_done = 0
+        v = vector(velocity, mesh.positions.shape)
+        _require("velocity", "an array", "finite", bool(np.isfinite(v).all()))
+        self._state = State(0.0, mesh.positions, v)
+        self._system: System | None = None
+        self._solver: Descent | None = None
+
+    def pin(self, nodes: npt.ArrayLike, axes: str = "xyz") -> None:
+        """Hold nodes where they are now, in all or some directions. Raises `InputError` (see `HeldNodes.hold`)."""
+        self._before_first_step("pin nodes")
+        self._held.hold(nodes, self._state.positions, axes=axes)
+
+    def move(self, nodes: npt.ArrayLike, motion: Motion) -> None:
+        """Move nodes by a script: motion(positions at time 0 (k, 3), time [s]) -> positions (k, 3) [m]."""
+        self._before_first_step("move nodes")
+        self._held.hold(nodes, self._state.positions, motion)
+
+    def _before_first_step(self, what: str) -> None:
+        if self._system is not None:
+            raise InputError(f"cannot {what} after the first step")
+
+    @property
+    def state(self) -> State:
+        """Time, positions and velocities now."""
+        return self._state
+
+    @property
+    def steps_done(self) -> int:
+        """How many steps lie behind `state`."""
+        return self._steps_done
+
+    @property
+    def system(self) -> System:
+        """The mechanical system; made when first asked for."""
+        if self._system is None:
+            self._system = System(
+                self.mesh,
+                self.material,
+                gravity=self.gravity,
+                mass=self.mass,
+                mass_damping=self.mass_damping,
+                held=self._held,
+                threads=self.threads,
+            )
+        return self._system
+
+    @property
+    def solver(self) -> Descent:
+        """The nonlinear solver, which owns the factor; made when first asked for."""
+        if self._solver is None:
+            self._solver = self._solver_class(self.system, self.solver_settings, self.tolerance)
+        return self._solver
+
+    def restore(self, state: State, steps_done: int, solver: dict[str, FloatArray]) -> None:
+        """Go on from a checkpoint: a state, the number of steps behind it, and what `solver.save()` gave then."""
+        self._state, self._steps_done = state, steps_done
+        self.solver.load(solver)
+
+    def run(self, steps: int) -> Iterator[StepResult]:
+        """Take `steps` time steps, yielding each. Raises `StepFailed` as `advance` does."""
+        for _ in range(steps):
+            yield self.advance()
+
+    def advance(self) -> StepResult:
+        """Take one time step.
+
+        Raises:
+            StepFailed: the step did not converge and `on_failure` is not "accept". The state stays as it was.
+        """
+        state, solves = self._take(self._integrator, self._state, self.step)
+        parts = 1
+        if self.on_failure == "halve" and not all(s.reason.converged for s in solves):
+            state, solves, parts = self._take_halves(self._state, self.step, solves)
+        step = self._steps_done + 1
+        result = StepResult(step, state.time, state.positions, state.velocities, solves, parts)
+        if not result.converged and (self.on_failure != "accept" or not _finite(state)):
+            raise StepFailed(_failure_message(result, self.solver.name), result)
+        last = self._state
+        self._state = State(last.time + self.step, state.positions, state.velocities, last.without_history())
+        self._steps_done = step
+        return result
+
+    def _take(self, integrator: Integrator, state: State, h: float) -> tuple[State, list[SolveResult]]:
+        """One step of `h`; stops at the first stage that fails, unless failed steps are to be accepted."""
+        solver, solves = self.solver, []
+        solver.begin_step()
+        stages = integrator.step(state, h)
+        stage = next(stages)
+        while True:
+            solve = solver.minimise(StageProblem(self.system, stage, state, self.timer))
+            solves.append(solve)
+            if not solve.reason.converged and self.on_failure != "accept":
+                return State(state.time + h, solve.positions, stage.velocity(solve.positions)), solves
+            try:
+                stage = stages.send(solve.positions)
+            except StopIteration as end:
+                x, v = end.value
+                return State(state.time + h, x, v), solves
+
+    def _take_halves(
+        self, start: State, h: float, solves: list[SolveResult], depth: int = 1
+    ) -> tuple[State, list[SolveResult], int]:
+        """The step as two halves by a one-step method, each cut again where it fails."""
+        integrator, state, parts = self._integrator.one_step_method(), start.without_history(), 0
+        for _ in range(2):
+            end, tried = self._take(integrator, state, h / 2)
+            solves, pieces = solves + tried, 1
+            if not tried[-1].reason.converged and depth < MAX_HALVINGS:
+                end, solves, pieces = self._take_halves(state, h / 2, solves, depth + 1)
+            parts += pieces
+            state = State(end.time, end.positions, end.velocities)
+            if not solves[-1].reason.converged:
+                break
+        return state, solves, max(parts, 2)
+
+
+def available_threads() -> int:
+    """How many CPUs this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _finite(state: State) -> bool:
+    return bool(np.isfinite(state.positions).all() and np.isfinite(state.velocities).all())
+
+
+def _failure_message(result: StepResult, solver: str) -> str:
+    solve = next((s for s in result.solves if not s.reason.converged), result.solves[-1])
+    relative = solve.residual / solve.reference if solve.reference else float("inf")
+    return (
+        f"step {result.step} (time {result.time:g} s) did not converge: {result.reason.value} after"
+        f" {solve.iterations} iterations of {solver}, |g| = {solve.residual:.3g} ({relative:.3g} of |g(x_k)|)"
+    )
+
+
+def _choose(what: str, name: str, choices: dict[str, type[T]]) -> type[T]:
+    if name not in choices:
+        raise InputError(f"{what} = {name!r} is not known: must be one of {', '.join(choices)}")
+    return choices[name]
+
+
+def _require(name: str, value: object, allowed: str, ok: bool) -> None:
+    if not ok:
+        raise InputError(f"{name} = {value!r} is out of range: must be {allowed}")

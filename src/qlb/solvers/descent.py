@@ -1,0 +1,115 @@
+"""The loop that all solvers share: direction, line search, convergence."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from qlb.arrays import FloatArray
+from qlb.solvers.factor import Factor
+from qlb.solvers.line_search import Point, backtrack
+from qlb.solvers.result import IterationRow, Reason, SolveResult
+from qlb.solvers.settings import SolverSettings, Tolerance
+from qlb.system import StageProblem, System
+
+
+class Descent(ABC):
+    """A descent method: a subclass says which direction to search, and what to do when a search fails."""
+
+    name: ClassVar[str]
+
+    def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
+        self.settings = settings
+        self.tolerance = tolerance
+        self.factor = Factor(system)
+
+    def begin_step(self) -> None:
+        """Called once before the stages of each time step."""
+
+    def begin_solve(self, problem: StageProblem) -> None:
+        """Called once before the iterations of each stage."""
+
+    @abstractmethod
+    def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
+        """The search direction p at a point, shape (n, 3), and the slope g.p along it."""
+
+    def accept(self, old: Point, new: Point) -> None:
+        """Learn from an accepted step."""
+
+    def recover(self, problem: StageProblem, point: Point) -> bool:
+        """After a failed search: change something so that `direction` differs; False when nothing is left to try."""
+        return False
+
+    def save(self) -> dict[str, FloatArray]:
+        """Arrays that a resumed run needs to go on to the same bits."""
+        return {}
+
+    def load(self, arrays: dict[str, FloatArray]) -> None:
+        """Take back what `save` gave."""
+
+    def minimise(self, problem: StageProblem) -> SolveResult:
+        """Minimise the stage's E from the initial guess until the tolerance is met or the solve fails."""
+        point = self._initial_point(problem)
+        reference = point.residual
+        if point.x is not problem.start:
+            reference = problem.residual(problem.value_gradient(problem.start)[1])
+        rows: list[IterationRow] = []
+        tried = self.factor.count
+
+        def record(point: Point, step_length: float) -> None:
+            nonlocal tried
+            made, tried = self.factor.count - tried, self.factor.count
+            rows.append(
+                IterationRow(len(rows), point.residual, point.energy, step_length, made, problem.timer.lap())
+            )
+
+        def end(reason: Reason) -> SolveResult:
+            return SolveResult(point.x, reason, point.residual, reference, rows)
+
+        record(point, 0.0)
+        if not problem.is_finite(point.energy, point.gradient):
+            return end(Reason.NOT_FINITE)
+        reason = self._converged(problem, point, reference)
+        if reason is None:
+            self.begin_solve(problem)
+        while reason is None:
+            found = self._search(problem, point)
+            if found is None:
+                record(point, 0.0)
+                return end(Reason.LINE_SEARCH_FAILED)
+            step_length, new = found
+            self.accept(point, new)
+            point = new
+            record(point, step_length)
+            reason = self._converged(problem, point, reference)
+            if reason is None and len(rows) > self.settings.max_iterations:
+                reason = Reason.MAX_ITERATIONS
+        return end(reason)
+
+    def _initial_point(self, problem: StageProblem) -> Point:
+        """x_k, or the predictor where it is asked for and its energy is finite."""
+        if self.settings.initial_guess == "predictor":
+            guess = Point.at(problem, problem.predictor())
+            if problem.is_finite(guess.energy, guess.gradient):
+                return guess
+        return Point.at(problem, problem.start)
+
+    def _search(self, problem: StageProblem, point: Point) -> tuple[float, Point] | None:
+        while True:
+            p, slope = self.direction(problem, point)
+            if np.isfinite(slope) and slope < 0:
+                found = backtrack(problem, point, p, slope)
+                if found is not None:
+                    return found
+            if not self.recover(problem, point):
+                return None
+
+    def _converged(self, problem: StageProblem, point: Point, reference: float) -> Reason | None:
+        tolerance = self.tolerance
+        if point.residual <= tolerance.relative * reference:
+            return Reason.CONVERGED_RELATIVE
+        if point.residual <= max(tolerance.absolute, tolerance.scaled * problem.residual_scale):
+            return Reason.CONVERGED_ABSOLUTE
+        return None

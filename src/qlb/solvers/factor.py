@@ -1,0 +1,63 @@
+"""A Cholesky factor of a stage's Hessian, made positive definite where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import FloatArray
+from qlb.solvers.settings import Projection
+from qlb.system import StageProblem, System
+
+
+class Factor:
+    """Owns the analysed factorisation of a system and counts how often it is made."""
+
+    def __init__(self, system: System) -> None:
+        self.cholesky = system.analyse()
+        self.count = 0
+        """Factorisations tried so far."""
+        self.projected = False
+        """Whether the factor in place is of the projected Hessian."""
+
+    def update(self, problem: StageProblem, x: FloatArray, projection: Projection) -> None:
+        """Factorise the Hessian at `x`.
+
+        With projection "on-demand" the exact Hessian is tried first. Should the last matrix that `projection` allows
+        still not be positive definite (to rounding, or an exact one under "never"), multiples of the identity are
+        added, each time ten times more (Nocedal, Wright 2006, algorithm 3.3).
+        """
+        for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
+            matrix = problem.hessian(x, project=project)
+            self.projected = project
+            if self._factorise(problem, matrix):
+                return
+        for shift in _shifts(matrix):
+            matrix.shift_diagonal(shift)
+            if self._factorise(problem, matrix):
+                return
+        raise FloatingPointError("the Hessian has entries that are not finite")
+
+    def _factorise(self, problem: StageProblem, matrix: _native.BlockMatrix) -> bool:
+        with problem.timer.section("factor"):
+            self.count += 1
+            return self.cholesky.factorise(matrix) < 0
+
+    def solve(self, problem: StageProblem, b: FloatArray) -> FloatArray:
+        """B^-1 b, shape (n, 3), zero at held degrees of freedom."""
+        with problem.timer.section("solve"):
+            x = np.empty_like(b)
+            self.cholesky.apply(b, x)
+            return x
+
+
+def _shifts(matrix: _native.BlockMatrix) -> Iterator[float]:
+    scale = float(np.abs(matrix.values).max())
+    total = 0.0
+    for exponent in range(-10, 3):
+        wanted = scale * 10.0**exponent
+        if np.isfinite(wanted):
+            yield wanted - total
+        total = wanted

@@ -1,0 +1,47 @@
+"""Backtracking line search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from qlb.arrays import FloatArray
+from qlb.system import StageProblem
+
+ARMIJO = 1e-4
+ROUNDING = 1e-11
+MAX_HALVINGS = 30
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point with the energy and gradient there."""
+
+    x: FloatArray
+    energy: float
+    gradient: FloatArray
+    residual: float
+
+    @staticmethod
+    def at(problem: StageProblem, x: FloatArray) -> Point:
+        """Evaluate `problem` at `x`."""
+        energy, gradient = problem.value_gradient(x)
+        return Point(x, energy, gradient, problem.residual(gradient))
+
+
+def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) -> tuple[float, Point] | None:
+    """The first of t = 1, 1/2, 1/4, ... that decreases E enough along `p`; None where none does.
+
+    Enough is Armijo's condition E(x + t p) <= E(x) + 1e-4 t g.p. Where the change of E is below 1e-11 |E|, rounding
+    hides it, and a point is taken if |g| does not grow. A trial that is not finite counts as too far.
+    """
+    t = 1.0
+    for _ in range(MAX_HALVINGS):
+        trial = Point.at(problem, start.x + t * p)
+        if problem.is_finite(trial.energy, trial.gradient):
+            change = trial.energy - start.energy
+            if change <= ARMIJO * t * slope:
+                return t, trial
+            if abs(change) <= ROUNDING * abs(start.energy) and trial.residual <= start.residual:
+                return t, trial
+        t *= 0.5
+    return None

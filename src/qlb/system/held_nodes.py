@@ -1,0 +1,102 @@
+"""Dirichlet nodes: fixed, or moved by a script. Their rows are eliminated and their positions set exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from qlb.arrays import FloatArray, IntArray
+from qlb.errors import InputError
+
+Motion = Callable[[FloatArray, float], FloatArray]
+"""Positions of held nodes [m]: motion(anchors (k, 3), time [s]) -> (k, 3), equal to the anchors at time 0."""
+
+
+@dataclass(frozen=True)
+class Translation:
+    """Moves nodes with a constant velocity [m/s], shape (3,)."""
+
+    velocity: tuple[float, float, float]
+
+    def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
+        """Positions [m] at `time` [s]."""
+        return anchors + time * np.asarray(self.velocity)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Turns nodes about an axis through `origin` [m] at `rate` [rev/s], from `start` to `stop` [s]."""
+
+    axis: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    rate: float
+    start: float = 0.0
+    stop: float = np.inf
+
+    def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
+        """Positions [m] at `time` [s], by Rodrigues' formula."""
+        angle = 2 * np.pi * self.rate * max(0.0, min(time, self.stop) - self.start)
+        k = np.asarray(self.axis, dtype=np.float64) / np.linalg.norm(self.axis)
+        r = anchors - np.asarray(self.origin)
+        turned = r * np.cos(angle) + np.cross(k, r) * np.sin(angle) + np.outer(r @ k, k) * (1 - np.cos(angle))
+        return np.asarray(turned + np.asarray(self.origin))
+
+
+@dataclass(frozen=True)
+class _Group:
+    nodes: IntArray
+    axes: list[int]
+    anchors: FloatArray
+    motion: Motion | None
+
+
+class HeldNodes:
+    """Which degrees of freedom are held, and where they are at each time."""
+
+    def __init__(self, nodes: int) -> None:
+        self.fixed = np.zeros((nodes, 3), dtype=np.uint8)
+        """Nonzero where a degree of freedom is held, shape (n, 3)."""
+        self._groups: list[_Group] = []
+
+    def hold(self, nodes: npt.ArrayLike, positions: FloatArray, motion: Motion | None = None, axes: str = "xyz") -> None:
+        """Hold `nodes` at their places in `positions` (n, 3) [m], or move them from there by `motion`.
+
+        Raises:
+            InputError: no nodes, an index out of range, a node held already, an axis that is not x, y or z.
+        """
+        indices = np.unique(np.asarray(nodes, dtype=np.int32))
+        if len(indices) == 0:
+            raise InputError("no nodes to hold: the selection is empty")
+        if indices[0] < 0 or indices[-1] >= len(self.fixed):
+            bad = indices[0] if indices[0] < 0 else indices[-1]
+            raise InputError(f"held node {bad} is out of range: must be in [0, {len(self.fixed) - 1}]")
+        if not axes or not set(axes) <= set("xyz"):
+            raise InputError(f"axes {axes!r} must be letters out of x, y, z")
+        columns = sorted({"xyz".index(axis) for axis in axes})
+        held = self.fixed[np.ix_(indices, columns)].any(axis=1)
+        if held.any():
+            raise InputError(f"node {indices[np.argmax(held)]} is held already; release it first")
+        self.fixed[np.ix_(indices, columns)] = 1
+        self._groups.append(_Group(indices, columns, positions[indices].copy(), motion))
+
+    def place(self, positions: FloatArray, time: float) -> FloatArray:
+        """`positions` (n, 3) [m] with every held degree of freedom exactly where it is at `time` [s]; a copy.
+
+        Raises:
+            InputError: a motion that gives another shape or a position that is not finite.
+        """
+        placed = positions.copy()
+        for group in self._groups:
+            target = group.anchors if group.motion is None else np.asarray(group.motion(group.anchors, time))
+            if target.shape != group.anchors.shape or not np.isfinite(target).all():
+                raise InputError(f"a motion gave positions of shape {target.shape} or not finite at time {time:g} s")
+            placed[np.ix_(group.nodes, group.axes)] = target[:, group.axes]
+        return placed
+
+    @property
+    def moving(self) -> bool:
+        """Whether any node is moved by a script."""
+        return any(group.motion is not None for group in self._groups)

@@ -1,0 +1,89 @@
+"""The one minimisation problem behind every implicit stage of every integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import FloatArray
+from qlb.integrators.integrator import Stage, State
+from qlb.system.system import System
+from qlb.timing import Timer
+
+
+class StageProblem:
+    """E(x) = 1/2 |x - x_hat|_M^2 + c^2 (Psi(x) - f.x) + c alpha/2 |x - x_b|_M^2, over the free degrees of freedom.
+
+    Its gradient is g(x) = M (x - x_hat) - c^2 f(x, v) with v = (x - x_b)/c and x_hat = x_b + c v_b; mass-proportional
+    damping f = -alpha M v has the potential written above. The two mass terms are one:
+    (1 + c alpha)/2 |x - x_b - c v_b/(1 + c alpha)|_M^2 up to a constant. A quasistatic stage has no mass terms and
+    c^2 = 1. Gradients have zeros, and positions the prescribed values, at the held degrees of freedom.
+    """
+
+    def __init__(self, system: System, stage: Stage, state: State, timer: Timer) -> None:
+        self.system = system
+        self.stage = stage
+        self.timer = timer
+        self.start: FloatArray = system.held.place(state.positions, stage.time)
+        """x_k [m] with the held nodes where they are at the stage's time, shape (n, 3)."""
+        self._state = state
+        self._mass_scale = 1.0 + stage.c * system.mass_damping if stage.inertial else 0.0
+        self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
+        self._load = self.force_scale * system.weight(stage.time)
+        self._hessian: _native.BlockMatrix | None = None
+
+    @property
+    def force_scale(self) -> float:
+        """What forces are multiplied by in g: c^2, or 1 in quasistatics."""
+        return self.stage.c**2 if self.stage.inertial else 1.0
+
+    @property
+    def residual_scale(self) -> float:
+        """|c^2 E_i V_i^(2/3)| over the nodes: the residual of a strain of order one (after Zhu et al. 2018)."""
+        return self.force_scale * self.system.norm(self.system.stiffness)
+
+    def value_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """E and its gradient at positions `x` [m]: kg m^2 and kg m (J and N in quasistatics), gradient (n, 3)."""
+        with self.timer.section("gradient"):
+            system = self.system
+            gradient = -self._load
+            energy = -system.dot(self._load, x - system.mesh.positions)
+            energy += system.elastic.add_value_gradient(x, self.force_scale, gradient)
+            if self.stage.inertial:
+                energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
+            return energy, system.clear_held(gradient)
+
+    def hessian(self, x: FloatArray, *, project: bool) -> _native.BlockMatrix:
+        """H = (1 + c alpha) M + c^2 d2Psi/dx2 at `x`, each element's part projected to PSD where asked.
+
+        The same matrix object is filled again at each call.
+        """
+        with self.timer.section("hessian"):
+            system = self.system
+            if self._hessian is None:
+                self._hessian = _native.BlockMatrix(system.pattern)
+            self._hessian.set_zero(system.threads)
+            system.elastic.add_hessian(x, self.force_scale, project, self._hessian)
+            if self.stage.inertial:
+                system.inertia.add_hessian(self._mass_scale, self._hessian)
+            return self._hessian
+
+    def predictor(self) -> FloatArray:
+        """x_k + t v_k + t^2/2 (v_k - v_{k-1})/h, t the stage's time into the step; held nodes exact.
+
+        In quasistatics x_k + (x_k - x_{k-1}). The terms of an earlier step are left out where there is none.
+        """
+        state, t = self._state, self.stage.time - self._state.time
+        guess = state.positions + t * state.velocities
+        if self.stage.inertial and state.previous is not None:
+            h = state.time - state.previous.time
+            guess += 0.5 * t**2 / h * (state.velocities - state.previous.velocities)
+        return self.system.held.place(guess, self.stage.time)
+
+    def residual(self, gradient: FloatArray) -> float:
+        """|g| over the free degrees of freedom."""
+        return self.system.norm(gradient)
+
+    def is_finite(self, energy: float, gradient: FloatArray) -> bool:
+        """Whether the energy and every entry of the gradient are numbers."""
+        return bool(np.isfinite(energy)) and bool(np.isfinite(self.residual(gradient)))

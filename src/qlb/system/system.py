@@ -1,0 +1,112 @@
+"""The mechanical system: what does not change from step to step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import FloatArray, vector
+from qlb.errors import InputError
+from qlb.materials.material import Material, per_element
+from qlb.mesh.tet_mesh import TetMesh
+from qlb.system.held_nodes import HeldNodes
+
+Gravity = tuple[float, float, float] | Callable[[float], FloatArray]
+"""Acceleration [m/s^2], constant or a function of time [s]."""
+MassKind = Literal["lumped", "consistent"]
+
+
+class System:
+    """Mesh, material, mass, loads and held nodes, with the compiled energies over them.
+
+    Attributes:
+        elastic: the elastic energy [J].
+        inertia: 1/2 |x - target|_M^2.
+        mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
+        stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
+    """
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        material: Material,
+        *,
+        gravity: Gravity,
+        mass: MassKind,
+        mass_damping: float,
+        held: HeldNodes,
+        threads: int,
+    ) -> None:
+        self.mesh = mesh
+        self.held = held
+        self.gravity = gravity
+        self.mass_damping = mass_damping
+        self.threads = threads
+        self.pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
+        blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
+        parameters = material.parameter_table(len(mesh.tets))
+        self.elastic = _native.ElasticEnergy(blocks, material.name, parameters, threads)
+        element_mass = per_element(material, material.density, len(mesh.tets)) * mesh.volumes()
+        row_begin, columns, values = mass_matrix(mesh, element_mass, mass)
+        self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
+        self.mass: FloatArray = np.add.reduceat(values, row_begin[:-1])
+        self.stiffness = _node_stiffness(mesh, per_element(material, material.modulus(), len(mesh.tets)))
+        self._fixed = np.flatnonzero(held.fixed.ravel())
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes n."""
+        return len(self.mesh.positions)
+
+    def weight(self, time: float) -> FloatArray:
+        """Forces of gravity at `time` [s] on the nodes [N], shape (n, 3)."""
+        acceleration = self.gravity(time) if callable(self.gravity) else self.gravity
+        return self.mass[:, None] * vector(acceleration, (3,))
+
+    def clear_held(self, gradient: FloatArray) -> FloatArray:
+        """Zero the entries of `gradient` (n, 3) that belong to held degrees of freedom, in place."""
+        gradient.reshape(-1)[self._fixed] = 0.0
+        return gradient
+
+    def dot(self, a: FloatArray, b: FloatArray) -> float:
+        """Inner product, the same bits for any number of threads."""
+        return _native.dot(a, b, self.threads)
+
+    def norm(self, a: FloatArray) -> float:
+        """Euclidean norm, the same bits for any number of threads."""
+        return float(np.sqrt(self.dot(a, a)))
+
+    def analyse(self) -> _native.Cholesky:
+        """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
+        return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
+
+
+def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The node mass matrix [kg] in compressed sparse rows: row begins (n + 1), columns, values.
+
+    Lumped: a quarter of each element to each of its nodes. Consistent: integrals of the products of the linear shape
+    functions, element_mass (1 + delta_ij)/20 (Zienkiewicz, Taylor 2000, vol. 1, ch. 17).
+    """
+    n = len(mesh.positions)
+    if kind == "lumped":
+        lumped = np.bincount(mesh.tets.ravel(), weights=np.repeat(element_mass / 4, 4), minlength=n)
+        return np.arange(n + 1, dtype=np.int64), np.arange(n, dtype=np.int32), lumped
+    if kind != "consistent":
+        raise InputError(f"mass = {kind!r} must be 'lumped' or 'consistent'")
+    local = (np.ones((4, 4)) + np.eye(4)) / 20
+    i = np.repeat(mesh.tets, 4, axis=1).astype(np.int64)
+    j = np.tile(mesh.tets, (1, 4)).astype(np.int64)
+    entries, inverse = np.unique((i * n + j).ravel(), return_inverse=True)
+    values = np.bincount(inverse.ravel(), weights=np.outer(element_mass, local.ravel()).ravel())
+    row_begin = np.searchsorted(entries, np.arange(n + 1, dtype=np.int64) * n)
+    return row_begin.astype(np.int64), (entries % n).astype(np.int32), values
+
+
+def _node_stiffness(mesh: TetMesh, modulus: FloatArray) -> FloatArray:
+    nodes, share = mesh.tets.ravel(), np.repeat(mesh.volumes() / 4, 4)
+    volume = np.bincount(nodes, weights=share, minlength=len(mesh.positions))
+    stiffness = np.bincount(nodes, weights=share * np.repeat(modulus, 4), minlength=len(mesh.positions))
+    return np.asarray(stiffness / volume ** (1 / 3))
