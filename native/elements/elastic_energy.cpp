@@ -1,5 +1,6 @@
 #include "elements/elastic_energy.hpp"
 
+#include <algorithm>
 #include <numeric>
 #include <stdexcept>
 
@@ -7,6 +8,11 @@
 
 namespace qlb {
 namespace {
+
+// Waking a thread costs about as much as four chunks of work.
+int threads_worth(std::size_t chunks, int threads) {
+  return std::max(1, std::min(threads, static_cast<int>(chunks / 4)));
+}
 
 // target[t, :] += scale * (sum of its slots), in the fixed order of the lists.
 template <int N>
@@ -27,7 +33,7 @@ void add_slots(const SlotLists& lists, const double* slots, double scale, double
 
 ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
                              std::span<const double> parameters, int threads, const std::string& simd_level)
-    : blocks_(std::move(blocks)), kernels_(&find_kernels(material, simd_level)), threads_(threads) {
+    : blocks_(std::move(blocks)), kernels_(&find_kernels(material, simd_level)), threads_(threads_worth(blocks_->chunks.size(), threads)) {
   const std::int64_t count = kernels_->parameter_count;
   if (static_cast<std::int64_t>(parameters.size()) != blocks_->elements * count)
     throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) + " parameters per element");

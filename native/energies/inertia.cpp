@@ -24,7 +24,7 @@ Inertia::Inertia(std::span<const std::int64_t> row_begin, std::span<const std::i
 
 double Inertia::add_value_gradient(const double* x, const double* target, double scale, double* gradient) {
   const auto groups = static_cast<std::int64_t>(partial_.size());
-#pragma omp parallel for schedule(static) num_threads(threads_)
+#pragma omp parallel for schedule(static) num_threads(threads_) if (groups > 8)
   for (std::int64_t group = 0; group < groups; ++group) {
     double sum = 0.0;
     for (std::int64_t i = group * kRows; i < std::min(nodes_, (group + 1) * kRows); ++i) {

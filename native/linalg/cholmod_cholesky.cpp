@@ -2,6 +2,7 @@
 
 #include <cblas.h>
 #include <cholmod.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <new>
@@ -12,6 +13,23 @@
 #include "linalg/ordering.hpp"
 
 namespace qlb {
+namespace {
+
+// Below this many operations a second BLAS thread costs more than it brings (seen at 12k tets, 0.4e9).
+constexpr double kThreadedFlops = 1e9;
+
+// CHOLMOD 3 opens a team of four OpenMP threads, a constant of its build, for each supernode, which on small fronts costs
+// several times the arithmetic. Within this scope its parallel regions run on one thread; BLAS keeps its own.
+class SerialOpenMp {
+ public:
+  SerialOpenMp() { omp_set_max_active_levels(0); }
+  ~SerialOpenMp() { omp_set_max_active_levels(levels_); }
+
+ private:
+  int levels_ = omp_get_max_active_levels();
+};
+
+}  // namespace
 
 struct CholmodCholesky::State {
   cholmod_common common;
@@ -61,6 +79,7 @@ CholmodCholesky::CholmodCholesky(std::shared_ptr<const BlockPattern> pattern, st
   s.check("analyse the matrix");
   factor_nonzeros_ = static_cast<std::int64_t>(s.common.lnz);
   factor_flops_ = s.common.fl;
+  blas_threads_ = factor_flops_ < kThreadedFlops ? 1 : threads_;
   const std::size_t n = dof_.size();
   s.right = cholmod_l_allocate_dense(n, 1, n, CHOLMOD_REAL, &s.common);
   s.check("allocate a vector");
@@ -115,7 +134,8 @@ std::int64_t CholmodCholesky::factorise(const BlockMatrix& matrix) {
 #pragma omp parallel for schedule(static) num_threads(threads_)
   for (std::int64_t k = 0; k < count; ++k) values[k] = matrix.values()[entry_[k]];
 
-  openblas_set_num_threads(threads_);
+  openblas_set_num_threads(blas_threads_);
+  const SerialOpenMp serial;
   cholmod_l_factorize(s.matrix, s.factor, &s.common);
   ready_ = false;
   s.check("factorise the matrix");
@@ -135,7 +155,8 @@ void CholmodCholesky::apply(const double* b, double* x) {
   auto* right = static_cast<double*>(s.right->x);
   const auto n = static_cast<std::int64_t>(dof_.size());
   for (std::int64_t k = 0; k < n; ++k) right[k] = b[dof_[k]];
-  openblas_set_num_threads(threads_);
+  openblas_set_num_threads(blas_threads_);
+  const SerialOpenMp serial;
   cholmod_l_solve2(CHOLMOD_A, s.factor, s.right, nullptr, &s.solution, nullptr, &s.work_y, &s.work_e, &s.common);
   s.check("solve");
   const auto* solution = static_cast<const double*>(s.solution->x);

@@ -33,7 +33,7 @@ class CholmodCholesky : public Cholesky {
   std::int64_t factor_nonzeros_ = 0;
   double factor_flops_ = 0.0;
   bool ready_ = false;
-  int threads_;
+  int threads_, blas_threads_ = 1;
   std::unique_ptr<State> state_;
 };
 

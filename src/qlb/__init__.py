@@ -1,6 +1,11 @@
 """qlb: fast, dependable time integration of hyperelastic solids."""
 
+import os as _os
 from importlib.metadata import version as _version
+
+# Threads of OpenMP that spin while BLAS works (or the other way round) slow both several times over. It must be set
+# before the OpenMP runtime is loaded; a value that the user has set wins.
+_os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from qlb.errors import InputError, QlbError, StepFailed
 from qlb.integrators import State

@@ -123,6 +123,7 @@ class Simulation:
         self.on_failure: OnFailure = on_failure
         self.threads = threads or available_threads()
         self.timer = Timer()
+        """Wall-clock seconds by part, from the first step on."""
         self._held = HeldNodes(len(mesh.positions))
         self._steps_done = 0
         v = vector(velocity, mesh.positions.shape)
@@ -175,6 +176,7 @@ class Simulation:
         """The nonlinear solver, which owns the factor; made when first asked for."""
         if self._solver is None:
             self._solver = self._solver_class(self.system, self.solver_settings, self.tolerance)
+            self.timer.restart()
         return self._solver
 
     def restore(self, state: State, steps_done: int, solver: dict[str, FloatArray]) -> None:

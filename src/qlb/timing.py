@@ -14,6 +14,10 @@ class Timer:
     """Adds up wall-clock seconds by part; what no section claims is "other"."""
 
     def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything counted so far."""
         self.seconds = dict.fromkeys(PARTS, 0.0)
         self._last = perf_counter()
         self._before = dict(self.seconds)

@@ -69,7 +69,7 @@ class Descent(ABC):
             return SolveResult(point.x, reason, point.residual, reference, rows)
 
         record(point, 0.0)
-        if not problem.is_finite(point.energy, point.gradient):
+        if not point.is_finite:
             return end(Reason.NOT_FINITE)
         reason = self._converged(problem, point, reference)
         if reason is None:
@@ -92,7 +92,7 @@ class Descent(ABC):
         """x_k, or the predictor where it is asked for and its energy is finite."""
         if self.settings.initial_guess == "predictor":
             guess = Point.at(problem, problem.predictor())
-            if problem.is_finite(guess.energy, guess.gradient):
+            if guess.is_finite:
                 return guess
         return Point.at(problem, problem.start)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 from qlb.arrays import FloatArray
 from qlb.system import StageProblem
@@ -21,6 +22,11 @@ class Point:
     gradient: FloatArray
     residual: float
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether the energy and every entry of the gradient are numbers."""
+        return isfinite(self.energy) and isfinite(self.residual)
+
     @staticmethod
     def at(problem: StageProblem, x: FloatArray) -> Point:
         """Evaluate `problem` at `x`."""
@@ -37,7 +43,7 @@ def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) 
     t = 1.0
     for _ in range(MAX_HALVINGS):
         trial = Point.at(problem, start.x + t * p)
-        if problem.is_finite(trial.energy, trial.gradient):
+        if trial.is_finite:
             change = trial.energy - start.energy
             if change <= ARMIJO * t * slope:
                 return t, trial
