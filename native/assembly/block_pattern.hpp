@@ -9,8 +9,8 @@ namespace qlb {
 
 class BlockPattern {
  public:
-  // Every row of `cliques` ((count, width), row by row) is a set of nodes that are all coupled; the diagonal is
-  // always present. Throws std::invalid_argument on a node outside [0, nodes).
+  // Every row of `cliques` ((count, width), row by row) is a set of nodes that are all coupled; the diagonal
+  // is always present. Throws std::invalid_argument on a node outside [0, nodes).
   BlockPattern(std::int64_t nodes, std::span<const std::int32_t> cliques, std::int64_t width);
 
   std::int64_t nodes() const { return nodes_; }
@@ -18,7 +18,8 @@ class BlockPattern {
   std::span<const std::int64_t> column_begin() const { return column_begin_; }
   std::span<const std::int32_t> rows() const { return row_; }
 
-  // Index of block (i, j) or (j, i), whichever is in the lower triangle; throws std::out_of_range if it is not there.
+  // Index of block (i, j) or (j, i), whichever is in the lower triangle; throws std::out_of_range if it is
+  // not there.
   std::int64_t find(std::int32_t i, std::int32_t j) const;
 
  private:

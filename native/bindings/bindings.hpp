@@ -1,4 +1,5 @@
-// Array types and checks shared by the bindings. Inputs may be converted; outputs are written in place, never copied.
+// Array types and checks shared by the bindings. Inputs may be converted; outputs are written in place, never
+// copied.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -27,8 +28,8 @@ std::span<T> view(const Array<T>& array) {
 template <class T>
 T* sized(const Array<T>& array, std::int64_t size, const char* name) {
   if (static_cast<std::int64_t>(array.size()) != size)
-    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) + " entries, expected " +
-                                std::to_string(size));
+    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) +
+                                " entries, expected " + std::to_string(size));
   return array.data();
 }
 

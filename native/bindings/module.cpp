@@ -1,5 +1,7 @@
 #include "bindings/bindings.hpp"
 
+#include <nanobind/stl/map.h>
+
 #include <cblas.h>
 #include <cholmod.h>
 #include <metis.h>
@@ -15,15 +17,15 @@ NB_MODULE(_native, m) {
   m.def("simd_levels", &simd_levels, "SIMD levels this build and this machine can run, the one in use last");
   m.def("material_names", &material_names);
   m.def("libraries", [] {
-    nb::dict versions;
-    versions["OpenBLAS"] = std::string(openblas_get_config());
+    std::map<std::string, std::string> versions;
+    versions["OpenBLAS"] = openblas_get_config();
     int cholmod[3];
     cholmod_l_version(cholmod);
     versions["CHOLMOD"] =
         std::to_string(cholmod[0]) + "." + std::to_string(cholmod[1]) + "." + std::to_string(cholmod[2]);
     versions["METIS"] = std::to_string(METIS_VER_MAJOR) + "." + std::to_string(METIS_VER_MINOR) + "." +
                         std::to_string(METIS_VER_SUBMINOR);
-    versions["compiler"] = std::string(__VERSION__);
+    versions["compiler"] = __VERSION__;
     return versions;
   });
 }

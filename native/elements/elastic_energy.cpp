@@ -33,10 +33,13 @@ void add_slots(const SlotLists& lists, const double* slots, double scale, double
 
 ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
                              std::span<const double> parameters, int threads, const std::string& simd_level)
-    : blocks_(std::move(blocks)), kernels_(&find_kernels(material, simd_level)), threads_(threads_worth(blocks_->chunks.size(), threads)) {
+    : blocks_(std::move(blocks)),
+      kernels_(&find_kernels(material, simd_level)),
+      threads_(threads_worth(blocks_->chunks.size(), threads)) {
   const std::int64_t count = kernels_->parameter_count;
   if (static_cast<std::int64_t>(parameters.size()) != blocks_->elements * count)
-    throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) + " parameters per element");
+    throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) +
+                                " parameters per element");
   parameters_ = blocks_->scatter(parameters, count);
   positions_.resize(4 * blocks_->slot_node.size());
   slot_gradient_.resize(3 * blocks_->slot_node.size());
@@ -75,7 +78,8 @@ double ElasticEnergy::value(const double* x) {
 
 double ElasticEnergy::add_value_gradient(const double* x, double scale, double* gradient) {
   for_each_chunk([&](std::int64_t k, const Chunk& chunk, const ChunkData& data, double* scratch) {
-    chunk_energy_[k] = kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + 3 * chunk.first_slot);
+    chunk_energy_[k] =
+        kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + 3 * chunk.first_slot);
   });
   add_slots<3>(blocks_->node_slots, slot_gradient_.data(), scale, gradient, threads_);
   return scale * std::accumulate(chunk_energy_.begin(), chunk_energy_.end(), 0.0);

@@ -1,5 +1,6 @@
-// The one loop over elements that serves every material. V is a SIMD vector, M<V> a material (materials/material.hpp).
-// Functions that are not templates over V are static: each SIMD level keeps its own.
+// The one loop over elements that serves every material. V is a SIMD vector, M<V> a material
+// (materials/material.hpp). Functions that are not templates over V are static: each SIMD level keeps its
+// own.
 #pragma once
 
 #include "elements/kernels.hpp"
@@ -18,7 +19,8 @@ struct Tets {
   const std::int32_t* pair;
 
   Tets(const ChunkData& chunk, std::int64_t pack, int lane) {
-    for (int k = 0; k < 9; ++k) Dm_inverse(k / 3, k % 3) = V::load_aligned(chunk.shape + (pack * 9 + k) * kLanes + lane);
+    for (int k = 0; k < 9; ++k)
+      Dm_inverse(k / 3, k % 3) = V::load_aligned(chunk.shape + (pack * 9 + k) * kLanes + lane);
     volume = V::load_aligned(chunk.volume + pack * kLanes + lane);
     vertex = chunk.vertex + pack * 4 * kLanes + lane;
     pair = chunk.pair + pack * kPairs * kLanes + lane;
@@ -35,7 +37,9 @@ struct Tets {
   }
 
   // Gradient of the shape function of vertex a = 1, 2, 3; that of vertex 0 is minus their sum.
-  Vec3<V> shape_gradient(int a) const { return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)}; }
+  Vec3<V> shape_gradient(int a) const {
+    return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)};
+  }
 };
 
 template <class M, class V>
@@ -57,7 +61,8 @@ void for_each_tets(const ChunkData& chunk, const Visit& visit) {
 // The chunk's own copy of its node positions, padded to 4 doubles a node.
 static inline void load_positions(const ChunkData& chunk, const double* x, double* positions) {
   for (std::int64_t s = 0; s < chunk.slots; ++s)
-    for (int c = 0; c < 3; ++c) positions[4 * s + c] = x[3 * static_cast<std::int64_t>(chunk.slot_node[s]) + c];
+    for (int c = 0; c < 3; ++c)
+      positions[4 * s + c] = x[3 * static_cast<std::int64_t>(chunk.slot_node[s]) + c];
 }
 
 static inline void set_zero(double* values, std::int64_t count) {
@@ -75,7 +80,8 @@ double chunk_value(const ChunkData& chunk, const double* x, double* positions) {
 }
 
 template <class V, template <class> class M>
-double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions, double* slot_gradient) {
+double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions,
+                            double* slot_gradient) {
   load_positions(chunk, x, positions);
   set_zero(slot_gradient, 3 * chunk.slots);
   V total(0.0);
@@ -104,12 +110,14 @@ void contract_stiffness(const Stiffness9<V>& C, const Tets<V>& tets, Mat3<V> (&H
     const Vec3<V> gb = tets.shape_gradient(b + 1);
     V T[9][3];
     for (int p = 0; p < 9; ++p)
-      for (int j = 0; j < 3; ++j) T[p][j] = C.c[p][3 * j] * gb[0] + C.c[p][3 * j + 1] * gb[1] + C.c[p][3 * j + 2] * gb[2];
+      for (int j = 0; j < 3; ++j)
+        T[p][j] = C.c[p][3 * j] * gb[0] + C.c[p][3 * j + 1] * gb[1] + C.c[p][3 * j + 2] * gb[2];
     for (int a = 0; a <= b; ++a) {
       const Vec3<V> ga = tets.shape_gradient(a + 1);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-          H[a][b](i, j) = tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
+          H[a][b](i, j) =
+              tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
     }
   }
 }
@@ -124,7 +132,8 @@ Spectrum<V> project_psd(Spectrum<V> H) {
   return H;
 }
 
-// The same blocks from a spectrum: contract in the frame of the SVD, where C is sparse, and turn each block back.
+// The same blocks from a spectrum: contract in the frame of the SVD, where C is sparse, and turn each block
+// back.
 template <class V>
 void contract_spectrum(const Spectrum<V>& S, const Svd3<V>& svd, const Tets<V>& tets, Mat3<V> (&H)[3][3]) {
   V same[3], mixed[3];  // C_(ij)(ij) and C_(ij)(ji), at the index left out
@@ -180,7 +189,8 @@ void scatter_blocks(const Tets<V>& tets, const Mat3<V> (&H)[3][3], double* slot_
 }
 
 template <class V, template <class> class M>
-void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double* positions, double* slot_blocks) {
+void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double* positions,
+                   double* slot_blocks) {
   load_positions(chunk, x, positions);
   set_zero(slot_blocks, 9 * chunk.block_slots);
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
@@ -219,13 +229,14 @@ Stiffness9<V> expand_spectrum(const Spectrum<V>& S, const Svd3<V>& svd) {
 }
 
 template <class V, template <class> class M>
-void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy, double* stress,
-                   double* stiffness) {
+void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy,
+                   double* stress, double* stiffness) {
   for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
     Mat3<V> F;
     for (int k = 0; k < 9; ++k) F(k / 3, k % 3) = V::load_unaligned(F_lanes + k * kLanes + lane);
     V parameters[M<V>::parameter_count];
-    for (int k = 0; k < M<V>::parameter_count; ++k) parameters[k] = V::load_unaligned(parameter_lanes + k * kLanes + lane);
+    for (int k = 0; k < M<V>::parameter_count; ++k)
+      parameters[k] = V::load_unaligned(parameter_lanes + k * kLanes + lane);
     const M<V> material(parameters);
     material.energy(F).store_unaligned(energy + lane);
     const Mat3<V> P = material.stress(F);

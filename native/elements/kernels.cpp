@@ -18,13 +18,21 @@ const MaterialKernels* kernel_table(MaterialList<M...>) {
 }  // namespace
 
 #if defined(QLB_SIMD_AVX512)
-const MaterialKernels* kernels_AVX512() { return kernel_table(AllMaterials{}); }
+const MaterialKernels* kernels_AVX512() {
+  return kernel_table(AllMaterials{});
+}
 #elif defined(QLB_SIMD_AVX2)
-const MaterialKernels* kernels_AVX2() { return kernel_table(AllMaterials{}); }
+const MaterialKernels* kernels_AVX2() {
+  return kernel_table(AllMaterials{});
+}
 #elif defined(QLB_SIMD_NEON64)
-const MaterialKernels* kernels_NEON64() { return kernel_table(AllMaterials{}); }
+const MaterialKernels* kernels_NEON64() {
+  return kernel_table(AllMaterials{});
+}
 #else
-const MaterialKernels* kernels_SSE2() { return kernel_table(AllMaterials{}); }
+const MaterialKernels* kernels_SSE2() {
+  return kernel_table(AllMaterials{});
+}
 #endif
 
 }  // namespace qlb

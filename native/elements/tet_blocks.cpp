@@ -9,7 +9,8 @@
 namespace qlb {
 namespace {
 
-constexpr std::int64_t kChunkPacks = 64;  // 512 elements: sums stay in L1/L2, and small meshes still feed every core
+constexpr std::int64_t kChunkPacks =
+    64;  // 512 elements: sums stay in L1/L2, and small meshes still feed every core
 
 std::uint64_t spread_bits(std::uint64_t v) {  // 21 bits to every third bit
   v &= 0x1fffff;
@@ -72,11 +73,13 @@ SlotLists invert(const std::vector<std::int32_t>& target, std::int64_t targets) 
   for (std::int64_t t = 0; t < targets; ++t) lists.begin[t + 1] += lists.begin[t];
   lists.slot.resize(target.size());
   std::vector<std::int64_t> next(lists.begin.begin(), lists.begin.end() - 1);
-  for (std::size_t s = 0; s < target.size(); ++s) lists.slot[next[target[s]]++] = static_cast<std::int32_t>(s);
+  for (std::size_t s = 0; s < target.size(); ++s)
+    lists.slot[next[target[s]]++] = static_cast<std::int32_t>(s);
   return lists;
 }
 
-// Replaces the global ids in `ids` by their rank among this chunk's distinct ids, which are appended to `all`.
+// Replaces the global ids in `ids` by their rank among this chunk's distinct ids, which are appended to
+// `all`.
 template <class Index>
 std::int64_t localise(std::span<Index> ids, std::vector<std::int32_t>& all) {
   std::vector<Index> unique(ids.begin(), ids.end());
@@ -92,7 +95,8 @@ std::int64_t localise(std::span<Index> ids, std::vector<std::int32_t>& all) {
 
 TetBlocks::TetBlocks(std::span<const double> rest_positions, std::span<const std::int32_t> tets,
                      const BlockPattern& pattern)
-    : nodes(static_cast<std::int64_t>(rest_positions.size()) / 3), elements(static_cast<std::int64_t>(tets.size()) / 4) {
+    : nodes(static_cast<std::int64_t>(rest_positions.size()) / 3),
+      elements(static_cast<std::int64_t>(tets.size()) / 4) {
   const std::vector<std::int32_t> order = morton_order(rest_positions, tets);
   const std::int64_t pack_count = (elements + kLanes - 1) / kLanes;
   vertex.resize(pack_count * 4 * kLanes);
@@ -104,8 +108,8 @@ TetBlocks::TetBlocks(std::span<const double> rest_positions, std::span<const std
   for (std::int64_t k = 0; k < pack_count * kLanes; ++k) {
     const std::int64_t pack = k / kLanes, lane = k % kLanes;
     const std::int32_t e = order[std::min(k, elements - 1)];
-    // Vertices ascending, so that each pair (a, b), a < b, is block (b, a) of the lower triangle. The deformation
-    // gradient does not depend on the order of the vertices.
+    // Vertices ascending, so that each pair (a, b), a < b, is block (b, a) of the lower triangle. The
+    // deformation gradient does not depend on the order of the vertices.
     std::array<std::int32_t, 4> tet;
     std::copy_n(tets.begin() + 4 * e, 4, tet.begin());
     std::sort(tet.begin(), tet.end());
@@ -129,7 +133,8 @@ TetBlocks::TetBlocks(std::span<const double> rest_positions, std::span<const std
     chunk.first_block_slot = static_cast<std::int64_t>(slot_block.size());
     const auto count = static_cast<std::size_t>(chunk.packs) * kLanes;
     chunk.slots = localise(std::span(vertex).subspan(first * 4 * kLanes, 4 * count), slot_node);
-    chunk.block_slots = localise(std::span(pair).subspan(first * kPairs * kLanes, kPairs * count), slot_block);
+    chunk.block_slots =
+        localise(std::span(pair).subspan(first * kPairs * kLanes, kPairs * count), slot_block);
     chunks.push_back(chunk);
   }
   node_slots = invert(slot_node, nodes);

@@ -12,8 +12,8 @@ namespace qlb {
 class Inertia {
  public:
   // The node mass matrix [kg] in compressed sparse rows, symmetric, both triangles.
-  Inertia(std::span<const std::int64_t> row_begin, std::span<const std::int32_t> columns, std::span<const double> values,
-          std::shared_ptr<const BlockPattern> pattern, int threads);
+  Inertia(std::span<const std::int64_t> row_begin, std::span<const std::int32_t> columns,
+          std::span<const double> values, std::shared_ptr<const BlockPattern> pattern, int threads);
 
   // Returns scale/2 |x - target|_M^2 and adds scale M (x - target) to gradient.
   double add_value_gradient(const double* x, const double* target, double scale, double* gradient);

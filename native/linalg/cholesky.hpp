@@ -1,4 +1,5 @@
-// What every sparse Cholesky factorisation offers: analyse once (in the constructor), then factorise and solve.
+// What every sparse Cholesky factorisation offers: analyse once (in the constructor), then factorise and
+// solve.
 #pragma once
 
 #include <cstdint>

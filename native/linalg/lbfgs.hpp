@@ -15,7 +15,8 @@ class Lbfgs {
 
   void clear() { count_ = 0; }
   int pairs() const { return count_; }
-  // Stores s = x - x_old, y = g - g_old; skipped (false) where s.y <= 1e-12 |s||y|: the curvature must be positive.
+  // Stores s = x - x_old, y = g - g_old; skipped (false) where s.y <= 1e-12 |s||y|: the curvature must be
+  // positive.
   bool push(const double* x_old, const double* x, const double* g_old, const double* g);
   // p = -H g, H the quasi-Newton inverse over `inner`. Returns g.p, the slope along p.
   double direction(const double* g, InverseOperator& inner, double* p);

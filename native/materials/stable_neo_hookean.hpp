@@ -25,7 +25,8 @@ struct StableNeoHookean {
     const V IC = contract(F, F);
     const V dJ = dot(column(F, 0), column(cofactor(F), 0)) - alpha;
     const V rest = V(1.0) - alpha;
-    return V(0.5) * (mu * (IC - V(3.0) - xsimd::log(V(0.25) * (IC + V(1.0)))) + lambda * (dJ * dJ - rest * rest));
+    return V(0.5) *
+           (mu * (IC - V(3.0) - xsimd::log(V(0.25) * (IC + V(1.0)))) + lambda * (dJ * dJ - rest * rest));
   }
 
   Mat3<V> stress(const Mat3<V>& F) const {

@@ -1,7 +1,8 @@
 // Branch-free symmetric eigenvalues and rotation-variant SVD of 3x3 matrices, one matrix per lane.
 //
 // Jacobi on F^T F gives V; QR of F V by Givens rotations gives U and the signed singular values
-// (McAdams, Selle, Tamstorf, Teran, Sifakis 2011). U and V are rotations; det F < 0 makes the last value negative.
+// (McAdams, Selle, Tamstorf, Teran, Sifakis 2011). U and V are rotations; det F < 0 makes the last value
+// negative.
 #pragma once
 
 #include <xsimd/xsimd.hpp>
@@ -82,7 +83,8 @@ void givens_rotate(Mat3<V>& B, Mat3<V>& U, int p, int q, int column) {
 }  // namespace detail
 
 // Eigenvalues on the diagonal of S on return; the eigenvectors are the columns of the rotation returned.
-// Convergence is quadratic; the loop ends when every lane is diagonal to rounding, or after 10 sweeps (NaN input).
+// Convergence is quadratic; the loop ends when every lane is diagonal to rounding, or after 10 sweeps (NaN
+// input).
 template <class V>
 Mat3<V> symmetric_eigen(Mat3<V>& S) {
   Mat3<V> Q = identity3<V>();

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -36,6 +36,12 @@ def quantity(
     return Field(default, description=description, json_schema_extra=extra)
 
 
+def choice(default: str, description: str, options: Iterable[str]) -> Any:
+    """One of a fixed set of names."""
+    extra: dict[str, Any] = {"enum": list(options)}
+    return Field(default, description=description, json_schema_extra=extra)
+
+
 def describe_range(bounds: Mapping[str, float], unit: str = "") -> str:
     """The allowed range in words, such as "> -1 and < 0.5" or "finite"."""
     text = " and ".join(f"{_BOUNDS[name]} {limit:g}" for name, limit in bounds.items()) or "finite"
@@ -45,7 +51,7 @@ def describe_range(bounds: Mapping[str, float], unit: str = "") -> str:
 class _RaisesInputError(ModelMetaclass):
     """Turns pydantic's errors into `InputError` where a user constructs a model."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:  # noqa: N805  (a metaclass)
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as error:
@@ -69,25 +75,39 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
     @classmethod
     def _check_range(cls, value: Any, info: ValidationInfo) -> Any:
         field = cls.model_fields[str(info.field_name)]
-        extra = field.json_schema_extra
-        if not isinstance(extra, dict) or "bounds" not in extra or value is None:
-            return value
-        bounds: Any = extra["bounds"]
-        numbers = _as_numbers(value)
-        bad = ~np.isfinite(numbers)
-        for name, limit in bounds.items():
-            bad |= ~_satisfies(name, numbers, limit)
-        if bad.any():
-            where = "" if numbers.ndim == 0 else f" at index {int(np.argmax(bad))}"
-            first = float(numbers[bad][0]) if numbers.ndim else float(numbers)
-            raise ValueError(f"{first:g}{where} is out of range: must be {describe_range(bounds, str(extra['unit']))}")
-        return numbers if numbers.ndim else float(numbers) if field.annotation is not int else value
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        if "enum" in extra:
+            options: Any = extra["enum"]
+            if value not in options:
+                raise ValueError(f"{value!r} is not known: must be one of {', '.join(options)}")
+        if "bounds" in extra and value is not None:
+            bounds: Any = extra["bounds"]
+            return _checked(value, bounds, str(extra["unit"]), whole=field.annotation is int)
+        return value
+
+
+def _checked(value: Any, bounds: Mapping[str, float], unit: str, *, whole: bool) -> Any:
+    """`value` as a float, an array of floats or (where `whole`) an int, all of it within `bounds`."""
+    numbers = _as_numbers(value)
+    bad = ~np.isfinite(numbers)
+    for name, limit in bounds.items():
+        bad |= ~_satisfies(name, numbers, limit)
+    if whole:
+        bad |= np.floor(numbers) != numbers
+    if bad.any():
+        where = "" if numbers.ndim == 0 else f" at index {int(np.argmax(bad))}"
+        first = float(numbers[bad][0]) if numbers.ndim else float(numbers)
+        kind = "a whole number " if whole else ""
+        raise ValueError(f"{first:g}{where} is out of range: must be {kind}{describe_range(bounds, unit)}")
+    if numbers.ndim:
+        return numbers
+    return int(numbers) if whole else float(numbers)
 
 
 def _as_numbers(value: Any) -> FloatArray:
-    if isinstance(value, bool):
-        raise ValueError(f"{value!r} is not a number")
     try:
+        if isinstance(value, bool):
+            raise TypeError
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{value!r} is not a number") from None
@@ -101,8 +121,6 @@ def _satisfies(name: str, numbers: FloatArray, limit: float) -> Any:
             "lt": np.less,
             "le": np.less_equal,
         }[name](numbers, limit)
-
-
 
 
 def _one_line(model: type[BaseModel], error: ValidationError) -> str:
@@ -150,5 +168,3 @@ def _nested_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return None
-
-

@@ -15,7 +15,7 @@ class SDIRK2(Integrator):
     name = "SDIRK2"
 
     def step(self, state: State, h: float) -> Steps:
-        """Stage 1 at t + a h from (x_k, v_k); stage 2 at t + h from x_k + (1 - a) h v_1, v_k + (1 - a)/a (v_1 - v_k)."""
+        """Stage 1 at t + a h from x_k, v_k; stage 2 at t + h from x_k + (1-a) h v_1, v_k + (1-a)/a (v_1 - v_k)."""
         x_k, v_k = state.positions, state.velocities
         first = Stage(state.time + A * h, A * h, x_k, v_k)
         v_1 = first.velocity((yield first))

@@ -6,4 +6,7 @@ from qlb.materials.stable_neo_hookean import StableNeoHookean
 MATERIALS: dict[str, type[IsotropicMaterial]] = {"SNH": StableNeoHookean}
 """Every material by the name that scene files use."""
 
-__all__ = ["MATERIALS", "IsotropicMaterial", "Material", "StableNeoHookean"]
+AnyMaterial = StableNeoHookean
+"""The union of all materials, told apart by `model`."""
+
+__all__ = ["MATERIALS", "AnyMaterial", "IsotropicMaterial", "Material", "StableNeoHookean"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,7 @@ class Material(Settings):
     Any parameter may be one number or an array with one value per element.
     """
 
-    name: ClassVar[str]
+    model: str
     """Short name, as in scene files; also the name of the compiled kernels."""
 
     density: PerElement = quantity(1000.0, "Mass density", unit="kg/m^3", gt=0)
@@ -59,7 +58,7 @@ class Material(Settings):
         F = np.ascontiguousarray(F, dtype=np.float64).reshape(-1, 3, 3)
         count = len(F)
         psi, P, C = np.empty(count), np.empty((count, 3, 3)), np.empty((count, 9, 9))
-        _native.evaluate_density(self.name, F, self.parameter_table(count), project, psi, P, C, simd_level)
+        _native.evaluate_density(self.model, F, self.parameter_table(count), project, psi, P, C, simd_level)
         return psi, P, C
 
 
@@ -83,6 +82,6 @@ def per_element(material: Material, value: PerElement, elements: int) -> FloatAr
     """`value` as an array over `elements`. Raises `InputError` where an array has another length."""
     if np.ndim(value) and np.shape(value) != (elements,):
         raise InputError(
-            f"a parameter of material {material.name} has shape {np.shape(value)}, must be one number or ({elements},)"
+            f"a parameter of material {material.model} has shape {np.shape(value)}, must be one number or ({elements},)"
         )
     return vector(value, (elements,))

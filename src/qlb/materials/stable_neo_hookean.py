@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 from qlb.materials.material import IsotropicMaterial
 from qlb.settings import PerElement
@@ -15,7 +15,6 @@ class StableNeoHookean(IsotropicMaterial):
     less its value at rest. `young` and `poisson` are those of its small-strain limit.
     """
 
-    name: ClassVar[str] = "SNH"
     model: Literal["SNH"] = "SNH"
 
     def kernel_parameters(self) -> tuple[PerElement, ...]:

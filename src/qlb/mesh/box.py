@@ -35,7 +35,10 @@ def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> T
     def corner(offset: np.ndarray) -> np.ndarray:
         return np.asarray((cell + np.where(mirrored, 1 - offset, offset)) @ strides)
 
-    paths = [np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(order)]]), axis=0) for order in permutations(range(3))]
+    paths = [
+        np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(order)]]), axis=0)
+        for order in permutations(range(3))
+    ]
     tets = np.stack([np.stack([corner(offset) for offset in path], axis=-1) for path in paths], axis=1).reshape(-1, 4)
     negative = signed_volumes(positions, tets.astype(np.int32)) < 0
     tets[negative, 2:] = tets[negative, :1:-1]

@@ -28,5 +28,6 @@ def read_tet_mesh(path: Path) -> TetMesh:
     tets = np.vstack(cells)
     used, renumbered = np.unique(tets, return_inverse=True)
     if used[0] < 0 or used[-1] >= len(data.points):
-        raise InputError(f"mesh file {path}: node index {used[-1] if used[0] >= 0 else used[0]} is outside its {len(data.points)} nodes")
+        bad = used[-1] if used[0] >= 0 else used[0]
+        raise InputError(f"mesh file {path}: node index {bad} is outside its {len(data.points)} nodes")
     return TetMesh(np.asarray(data.points, dtype=np.float64)[used, :3], renumbered.reshape(-1, 4))

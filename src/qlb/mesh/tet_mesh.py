@@ -129,5 +129,6 @@ def _check_geometry(mesh: TetMesh) -> None:
     used[mesh.tets] = True
     if not used.all():
         raise InputError(
-            f"node {int(np.argmin(used))} belongs to no tet ({np.count_nonzero(~used)} such nodes); each node must be used"
+            f"node {int(np.argmin(used))} belongs to no tet ({np.count_nonzero(~used)} such nodes);"
+            " each node must be used"
         )

@@ -61,9 +61,7 @@ class Descent(ABC):
         def record(point: Point, step_length: float) -> None:
             nonlocal tried
             made, tried = self.factor.count - tried, self.factor.count
-            rows.append(
-                IterationRow(len(rows), point.residual, point.energy, step_length, made, problem.timer.lap())
-            )
+            rows.append(IterationRow(len(rows), point.residual, point.energy, step_length, made, problem.timer.lap()))
 
         def end(reason: Reason) -> SolveResult:
             return SolveResult(point.x, reason, point.residual, reference, rows)

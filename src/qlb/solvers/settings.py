@@ -34,7 +34,8 @@ class SolverSettings(Settings):
         " Cholesky fails on the exact one; never: shift the diagonal instead",
     )
     initial_guess: InitialGuess = Field(
-        "previous", description="Where a solve starts (all solvers): x_k, or the predictor from velocity and acceleration"
+        "previous",
+        description="Where a solve starts (all solvers): x_k, or the predictor from velocity and acceleration",
     )
     max_iterations: int = quantity(500, "Nonlinear iterations of one solve before it counts as failed", ge=1)
     window: int = quantity(5, "Pairs that L-BFGS keeps (QLF, QLB)", ge=1, le=100)

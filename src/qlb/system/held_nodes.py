@@ -48,7 +48,7 @@ class Rotation:
 @dataclass(frozen=True)
 class _Group:
     nodes: IntArray
-    axes: list[int]
+    axes: IntArray
     anchors: FloatArray
     motion: Motion | None
 
@@ -61,7 +61,9 @@ class HeldNodes:
         """Nonzero where a degree of freedom is held, shape (n, 3)."""
         self._groups: list[_Group] = []
 
-    def hold(self, nodes: npt.ArrayLike, positions: FloatArray, motion: Motion | None = None, axes: str = "xyz") -> None:
+    def hold(
+        self, nodes: npt.ArrayLike, positions: FloatArray, motion: Motion | None = None, axes: str = "xyz"
+    ) -> None:
         """Hold `nodes` at their places in `positions` (n, 3) [m], or move them from there by `motion`.
 
         Raises:
@@ -75,7 +77,7 @@ class HeldNodes:
             raise InputError(f"held node {bad} is out of range: must be in [0, {len(self.fixed) - 1}]")
         if not axes or not set(axes) <= set("xyz"):
             raise InputError(f"axes {axes!r} must be letters out of x, y, z")
-        columns = sorted({"xyz".index(axis) for axis in axes})
+        columns = np.array(sorted({"xyz".index(axis) for axis in axes}), dtype=np.int32)
         held = self.fixed[np.ix_(indices, columns)].any(axis=1)
         if held.any():
             raise InputError(f"node {indices[np.argmax(held)]} is held already; release it first")

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray, vector
+from qlb.arrays import FloatArray, IntArray, LongArray, vector
 from qlb.errors import InputError
 from qlb.materials.material import Material, per_element
 from qlb.mesh.tet_mesh import TetMesh
@@ -48,7 +48,7 @@ class System:
         self.pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
         blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
         parameters = material.parameter_table(len(mesh.tets))
-        self.elastic = _native.ElasticEnergy(blocks, material.name, parameters, threads)
+        self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
         element_mass = per_element(material, material.density, len(mesh.tets)) * mesh.volumes()
         row_begin, columns, values = mass_matrix(mesh, element_mass, mass)
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
@@ -84,7 +84,7 @@ class System:
         return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
 
 
-def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tuple[FloatArray, FloatArray, FloatArray]:
+def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tuple[LongArray, IntArray, FloatArray]:
     """The node mass matrix [kg] in compressed sparse rows: row begins (n + 1), columns, values.
 
     Lumped: a quarter of each element to each of its nodes. Consistent: integrals of the products of the linear shape
@@ -92,7 +92,8 @@ def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tupl
     """
     n = len(mesh.positions)
     if kind == "lumped":
-        lumped = np.bincount(mesh.tets.ravel(), weights=np.repeat(element_mass / 4, 4), minlength=n)
+        share = np.repeat(element_mass / 4, 4)
+        lumped = np.bincount(mesh.tets.ravel(), weights=share, minlength=n).astype(np.float64)
         return np.arange(n + 1, dtype=np.int64), np.arange(n, dtype=np.int32), lumped
     if kind != "consistent":
         raise InputError(f"mass = {kind!r} must be 'lumped' or 'consistent'")
@@ -100,7 +101,7 @@ def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tupl
     i = np.repeat(mesh.tets, 4, axis=1).astype(np.int64)
     j = np.tile(mesh.tets, (1, 4)).astype(np.int64)
     entries, inverse = np.unique((i * n + j).ravel(), return_inverse=True)
-    values = np.bincount(inverse.ravel(), weights=np.outer(element_mass, local.ravel()).ravel())
+    values = np.bincount(inverse.ravel(), weights=np.outer(element_mass, local).ravel()).astype(np.float64)
     row_begin = np.searchsorted(entries, np.arange(n + 1, dtype=np.int64) * n)
     return row_begin.astype(np.int64), (entries % n).astype(np.int32), values
 

@@ -1,0 +1,51 @@
+# Two commands do everything: `make run` shows the bar, `make test` proves the package right.
+PYTHON ?= python3
+BIN := .venv/bin
+BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
+NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
+FORMATTED := src tests benchmarks examples
+
+.PHONY: run test quick lint format stubs bench docs setup clean
+
+run: setup  ## Run the bar; leaves a picture, a plot and a report below runs/
+	$(BIN)/qlb run bar
+
+test: setup lint  ## Lint, type check and every test
+	$(BIN)/pytest -n 2
+
+quick: setup lint  ## Lint, type check and the fast tests
+	$(BIN)/pytest -n 2 -m "not slow"
+
+lint: setup
+	$(BIN)/ruff format --check --quiet $(FORMATTED)
+	$(BIN)/ruff check --quiet $(FORMATTED)
+	find native -name '*.?pp' | xargs $(BIN)/clang-format --dry-run --Werror
+	$(BIN)/mypy
+
+format: setup  ## Format Python and C++
+	$(BIN)/ruff check --quiet --fix-only $(FORMATTED)
+	$(BIN)/ruff format --quiet $(FORMATTED)
+	find native -name '*.?pp' | xargs $(BIN)/clang-format -i
+
+stubs: setup  ## Write the type stub of the compiled module again
+	$(BIN)/python -m nanobind.stubgen -q -m qlb._native -o src/qlb/_native.pyi
+
+bench: setup  ## Benchmarks of a step and of the kernels; tables on the terminal
+	$(BIN)/python -m benchmarks
+
+docs: setup  ## Check that the snippets in README and docs run
+	$(BIN)/pytest tests/docs
+
+setup: .venv/.installed
+
+# An editable install; it is made again when native sources or requirements change.
+.venv/.installed: $(NATIVE) scripts/install-system.sh
+	./scripts/install-system.sh
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet $(BUILD_REQUIRES)
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[dev]'
+	touch $@
+
+clean:
+	rm -rf .venv build

@@ -1,0 +1,106 @@
+"""Where the time of a step goes, for each solver, on the drop or twist bar.
+
+Every case starts from the same state, runs the same steps to the same tolerance, and its final state is held against
+that of the first case. Repeats are interleaved over the cases, and the fastest repeat of each counts, so that a slow
+spell of the machine does not fall on one case alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import process_time
+
+import numpy as np
+
+from benchmarks.machine import machine_line, markdown
+from qlb.arrays import FloatArray
+from qlb.scenes import load_scene
+from qlb.studies import SolverCase
+from qlb.timing import PARTS
+
+CELLS = {1536: "16,4,4", 5184: "24,6,6", 12288: "32,8,8", 53742: "53,13,13", 192000: "80,20,20"}
+CASES = ("ND", "ND:projection=on-demand:initial_guess=predictor", "QLB", "QLF")
+
+
+@dataclass
+class Measurement:
+    """The fastest of several repeats of one case."""
+
+    cpu: float = float("inf")
+    seconds: dict[str, float] = field(default_factory=dict)
+    iterations: float = 0.0
+    factorizations: float = 0.0
+    failed: int = 0
+    positions: FloatArray | None = None
+
+
+def run_case(case: SolverCase, cells: str, variant: str, steps: int, threads: int, best: Measurement) -> None:
+    """Run one case once; keep it if it is the fastest so far."""
+    overrides = [f"mesh.cells={cells}", f"variant={variant}", f"threads={threads}", "on_failure=accept"]
+    simulation = load_scene("bar", [*overrides, *case.overrides]).build()
+    _ = simulation.solver  # set-up (ordering, analysis) is not part of a step
+    start = process_time()
+    results = list(simulation.run(steps))
+    cpu = process_time() - start
+    if cpu < best.cpu:
+        simulation.timer.lap()
+        best.cpu = cpu
+        best.seconds = dict(simulation.timer.seconds)
+        best.iterations = float(np.mean([r.iterations for r in results]))
+        best.factorizations = float(np.mean([r.factorizations for r in results]))
+        best.failed = sum(not r.converged for r in results)
+        best.positions = results[-1].positions
+
+
+def measure(
+    tets: int, cases: list[SolverCase], *, variant: str, steps: int, threads: int, repeats: int
+) -> dict[str, Measurement]:
+    """Measure every case on the bar of `tets` tetrahedra."""
+    found = {case.label: Measurement() for case in cases}
+    for _ in range(repeats):
+        for case in cases:
+            run_case(case, CELLS[tets], variant, steps, threads, found[case.label])
+    return found
+
+
+def table(
+    sizes: list[int], cases: list[str], *, variant: str = "drop", steps: int = 20, threads: int = 1, repeats: int = 3
+) -> str:
+    """The split of a step for each size and case, as Markdown."""
+    rows = []
+    for tets in sizes:
+        found = measure(
+            tets,
+            [SolverCase.parse(case) for case in cases],
+            variant=variant,
+            steps=steps,
+            threads=threads,
+            repeats=repeats,
+        )
+        first = next(iter(found.values()))
+        assert first.positions is not None
+        for label, m in found.items():
+            assert m.positions is not None
+            total = sum(m.seconds.values())
+            rows.append(
+                [
+                    f"{tets}",
+                    f"`{label}`",
+                    f"{m.iterations:.1f}",
+                    f"{m.factorizations:.2f}",
+                    *(f"{1e3 * m.seconds[part] / steps:.2f}" for part in PARTS),
+                    f"{1e3 * m.cpu / steps:.2f}",
+                    f"{m.cpu / first.cpu:.2f}",
+                    f"{100 * m.seconds['other'] / total:.1f} %",
+                    f"{np.abs(m.positions - first.positions).max():.0e}" + (f", {m.failed} failed" if m.failed else ""),
+                ]
+            )
+    header = ["tets", "solver", "iterations", "factors", *(f"{p} ms" for p in PARTS), "CPU ms", "CPU ratio"]
+    title = f"Bar, {variant}, {steps} steps of the default scene, tolerance 1e-6 relative, best of {repeats}."
+    return "\n\n".join(
+        [
+            "### Split of a step",
+            f"{title} {machine_line(threads)}.",
+            markdown([*header, "Python", "final state off [m]"], rows),
+        ]
+    )

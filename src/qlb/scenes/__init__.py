@@ -1,0 +1,10 @@
+"""Scenes: what to simulate, as settings that a file or the command line can change."""
+
+from qlb.scenes.bar import BarScene
+from qlb.scenes.files import load_scene, scene_yaml
+from qlb.scenes.scene import Scene
+
+SCENES: dict[str, type[Scene]] = {"bar": BarScene}
+"""Every built-in scene by name."""
+
+__all__ = ["SCENES", "BarScene", "Scene", "load_scene", "scene_yaml"]

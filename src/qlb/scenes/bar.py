@@ -1,0 +1,54 @@
+"""The bar of the paper: a box of tetrahedra, held at one end or at both."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from qlb.mesh import TetMesh
+from qlb.scenes.scene import Scene, Vector
+from qlb.settings import Settings, quantity
+from qlb.simulation import Simulation
+from qlb.system import Rotation
+
+
+class BoxMeshSettings(Settings):
+    """A box of tetrahedra, or a mesh file."""
+
+    size: Vector = Field((1.0, 0.25, 0.25), description="Lengths of the box [m]")
+    cells: tuple[int, int, int] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
+    path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the box")
+
+
+class TwistSettings(Settings):
+    """How the twist variant turns its far end."""
+
+    rate: float = quantity(0.5, "Turns per second about the bar's axis", unit="rev/s")
+
+
+class BarScene(Scene):
+    """A bar held at its x = 0 end that falls under gravity (drop), or held at both ends, one turning (twist)."""
+
+    scene: Literal["bar"] = "bar"
+    variant: Literal["drop", "twist"] = Field("drop", description="drop: one end held; twist: both, the far one turns")
+    mesh: BoxMeshSettings = BoxMeshSettings()
+    twist: TwistSettings = TwistSettings()
+
+    def build(self) -> Simulation:
+        """The bar with its ends held. Raises `InputError` where mesh or settings are wrong."""
+        mesh = (
+            TetMesh.box(self.mesh.size, cells=self.mesh.cells)
+            if self.mesh.path is None
+            else TetMesh.read(self.mesh.path)
+        )
+        low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+        near = 1e-6 * (high[0] - low[0])
+        simulation = Simulation(mesh, **self.simulation_arguments())
+        simulation.pin(mesh.nodes_where(lambda x: x[:, 0] <= low[0] + near))
+        if self.variant == "twist":
+            centre = 0.5 * (low + high)
+            axis = Rotation(axis=(1.0, 0.0, 0.0), origin=tuple(centre), rate=self.twist.rate)
+            simulation.move(mesh.nodes_where(lambda x: x[:, 0] >= high[0] - near), axis)
+        return simulation

@@ -1,0 +1,120 @@
+"""Scenes from files and from KEY=VALUE pairs, and back to a commented file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel
+
+from qlb.errors import InputError
+from qlb.scenes.scene import Scene
+from qlb.settings import describe_range, key_fields, unknown_key
+
+
+def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:
+    """A built-in scene by name, or a scene file (YAML) by path, with KEY=VALUE overrides in order.
+
+    Raises:
+        InputError: no such scene or file, a file that is not valid, an unknown key, a value out of range.
+    """
+    from qlb.scenes import SCENES
+
+    data: dict[str, Any] = {}
+    if name not in SCENES:
+        data = _read(name, SCENES)
+    kind = SCENES[data.get("scene", name)]
+    for override in overrides:
+        _override(kind, data, override)
+    return kind.parse(data)
+
+
+def _read(name: str, scenes: Mapping[str, type[Scene]]) -> dict[str, Any]:
+    path = Path(name)
+    known = f"built-in scenes: {', '.join(scenes)}"
+    if not path.is_file():
+        raise InputError(f"scene {name!r} is neither a built-in scene nor a file; {known}")
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"scene file {name} is not valid YAML: {' '.join(str(error).split())}") from None
+    except OSError as error:
+        raise InputError(f"scene file {name} cannot be read: {error.strerror}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"scene file {name} holds {type(data).__name__}, must hold keys and values")
+    if data.get("scene") not in scenes:
+        raise InputError(f"scene file {name}: scene = {data.get('scene')!r} is not known; {known}")
+    mesh = data.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("path"), str):
+        mesh["path"] = str(path.parent / mesh["path"])
+    return data
+
+
+def _override(kind: type[Scene], data: dict[str, Any], override: str) -> None:
+    key, separator, text = override.partition("=")
+    key = key.strip()
+    if not separator or not key:
+        raise InputError(f"--set {override!r} must have the form KEY=VALUE")
+    if key not in key_fields(kind):
+        raise InputError(unknown_key(kind, key))
+    *parents, last = key.split(".")
+    for parent in parents:
+        inner = data.setdefault(parent, {})
+        if not isinstance(inner, dict):
+            raise InputError(f"{parent} = {inner!r} must hold keys and values")
+        data = inner
+    data[last] = _value(text)
+
+
+def _value(text: str) -> Any:
+    """A value as YAML reads it; "1,2,3" is a list."""
+    try:
+        if "," in text and not text.lstrip().startswith("["):
+            return [_value(part) for part in text.split(",")]
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        return text
+
+
+def scene_yaml(scene: Scene) -> str:
+    """The scene as a file with every key, and what each means. `load_scene` reads it back to the same scene."""
+    lines = [f"# {type(scene).__doc__}", f"scene: {scene.model_dump()['scene']}"]
+    lines += _lines(scene, indent="")
+    return "\n".join(lines) + "\n"
+
+
+def _lines(model: BaseModel, indent: str) -> list[str]:
+    lines: list[str] = []
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if name == "scene":
+            continue
+        if isinstance(value, BaseModel):
+            lines += ["", f"{indent}{name}:"] if not indent else [f"{indent}{name}:"]
+            lines += _lines(value, indent + "  ")
+            continue
+        text = f"{indent}{name}: {_plain(value)}"
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        notes = [field.description or ""]
+        if "enum" in extra:
+            notes.append(f"one of {', '.join(map(str, extra['enum']))}")  # type: ignore[arg-type]
+        if "bounds" in extra:
+            notes.append(describe_range(extra["bounds"], str(extra["unit"])))  # type: ignore[arg-type]
+        comment = "; ".join(note for note in notes if note)
+        lines.append(f"{text:<36} # {comment}" if comment else text)
+    return lines
+
+
+def _plain(value: Any) -> str:
+    """One line of YAML for a leaf value."""
+    if value is None:
+        return "null"
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, tuple):
+        value = list(value)
+    if isinstance(value, Path):
+        value = str(value)
+    return yaml.safe_dump(value, default_flow_style=True, width=2**31).strip().removesuffix("...").strip()

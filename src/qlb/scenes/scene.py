@@ -1,0 +1,92 @@
+"""The settings that every scene has."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from qlb.integrators import INTEGRATORS
+from qlb.materials import AnyMaterial, StableNeoHookean
+from qlb.settings import Settings, choice, quantity
+from qlb.simulation import OnFailure, Simulation
+from qlb.solvers import SOLVERS, SolverSettings, Tolerance
+from qlb.system.system import Gravity, MassKind
+
+Vector = tuple[float, float, float]
+
+
+class DampingSettings(Settings):
+    """Damping of the motion."""
+
+    mass: float = quantity(0.0, "Rayleigh's mass-proportional damping alpha, a force -alpha M v", unit="1/s", ge=0)
+
+
+class LoadSettings(Settings):
+    """Loads on the body."""
+
+    gravity: Vector = Field((0.0, -9.81, 0.0), description="Acceleration [m/s^2]")
+    ramp: float | None = quantity(
+        None,
+        "Time over which gravity grows linearly from nothing [s]; by default 0, and the whole run in quasistatics",
+        unit="s",
+        ge=0,
+    )
+
+
+class OutputSettings(Settings):
+    """What a run writes."""
+
+    stride: int = quantity(1, "Write every so many steps a frame", ge=1)
+
+
+class Scene(Settings):
+    """Settings common to all scenes; a subclass adds its own and builds the simulation."""
+
+    material: AnyMaterial = Field(StableNeoHookean(), description="What the body is made of")
+    mass: MassKind = Field("lumped", description="lumped or consistent mass matrix")
+    damping: DampingSettings = DampingSettings()
+    loads: LoadSettings = LoadSettings()
+    integrator: str = choice("BDF2", "Time integrator", INTEGRATORS)
+    solver: str = choice("QLB", "Nonlinear solver", SOLVERS)
+    step: float = quantity(1e-2, "Time step h", unit="s", gt=0)
+    steps: int = quantity(120, "Number of time steps", ge=1)
+    tolerance: Tolerance = Tolerance()
+    solver_settings: SolverSettings = SolverSettings()
+    on_failure: OnFailure = Field(
+        "stop",
+        description="A step that does not converge: stop; halve it, down to h/256; accept it, marked as not converged",
+    )
+    threads: int | None = quantity(None, "Threads for kernels and BLAS; all that the process may use by default", ge=1)
+    output: OutputSettings = OutputSettings()
+
+    @abstractmethod
+    def build(self) -> Simulation:
+        """The simulation that the scene describes. Raises `InputError` where mesh or settings are wrong."""
+
+    def gravity(self) -> Gravity:
+        """Gravity with its ramp."""
+        acceleration, ramp = np.asarray(self.loads.gravity), self.loads.ramp
+        if ramp is None:
+            ramp = self.steps * self.step if self.integrator == "quasistatic" else 0.0
+        if ramp == 0:
+            return self.loads.gravity
+        return lambda time: acceleration * min(1.0, time / ramp)
+
+    def simulation_arguments(self) -> dict[str, Any]:
+        """The keyword arguments of `Simulation` that every scene passes on."""
+        return {
+            "material": self.material,
+            "integrator": self.integrator,
+            "solver": self.solver,
+            "step": self.step,
+            "gravity": self.gravity(),
+            "mass": self.mass,
+            "mass_damping": self.damping.mass,
+            "tolerance": self.tolerance,
+            "solver_settings": self.solver_settings,
+            "on_failure": self.on_failure,
+            "threads": self.threads,
+        }

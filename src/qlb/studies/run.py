@@ -1,0 +1,70 @@
+"""One scene, run into a directory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from qlb.errors import StepFailed
+from qlb.results import Run, RunWriter
+from qlb.scenes import Scene
+from qlb.simulation import StepResult
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended."""
+
+    directory: Path
+    summary: dict[str, Any]
+    """as in summary.json"""
+
+    @property
+    def run(self) -> Run:
+        """The run, to be read."""
+        return Run(self.directory)
+
+
+def run_scene(
+    scene: Scene,
+    directory: Path,
+    *,
+    overwrite: bool = False,
+    on_step: Callable[[StepResult], None] = lambda result: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """Run `scene` into `directory`, keeping every finished step whatever happens.
+
+    Args:
+        scene: what to run.
+        directory: where; made, and refused if it holds anything.
+        overwrite: replace an earlier run there.
+        on_step: called after each step, the failed one included.
+        stop: asked before each step whether to end early.
+
+    Raises:
+        InputError: the scene cannot be built, or the directory cannot be used.
+    """
+    simulation = scene.build()
+    writer = RunWriter(directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite)
+    status, error = "complete", None
+    try:
+        for _ in range(scene.steps):
+            if stop():
+                status = "interrupted"
+                break
+            result = simulation.advance()
+            writer.record(result)
+            on_step(result)
+    except StepFailed as failure:
+        writer.record_failed(failure.result)
+        on_step(failure.result)
+        status, error = "failed", str(failure)
+    except KeyboardInterrupt:
+        status = "interrupted"
+    except BaseException as crash:
+        writer.finish("failed", f"{type(crash).__name__}: {crash}")
+        raise
+    return Outcome(directory, dict(writer.finish(status, error)))
