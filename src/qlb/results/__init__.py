@@ -1,0 +1,27 @@
+"""Results of runs: the run directory, plots, pictures and reports."""
+
+from qlb.results.errors import MissingExtra, RenderingFailed, WriteError
+from qlb.results.picture import render_frames
+from qlb.results.plots import plot_iterations, plot_residuals, plot_seconds
+from qlb.results.report import finish_run, write_comparison, write_report
+from qlb.results.run import Frame, Run, StepIterations
+from qlb.results.run_writer import RunWriter
+from qlb.results.statistics import COLUMNS
+
+__all__ = [
+    "COLUMNS",
+    "Frame",
+    "MissingExtra",
+    "RenderingFailed",
+    "Run",
+    "RunWriter",
+    "StepIterations",
+    "WriteError",
+    "finish_run",
+    "plot_iterations",
+    "plot_residuals",
+    "plot_seconds",
+    "render_frames",
+    "write_comparison",
+    "write_report",
+]

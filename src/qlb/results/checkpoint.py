@@ -1,0 +1,68 @@
+"""What a run needs to go on to the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from qlb.arrays import FloatArray
+from qlb.errors import InputError
+from qlb.integrators import State
+from qlb.results.files import Arrays, read_arrays, write_arrays
+from qlb.simulation import Simulation
+
+_SOLVER = "solver/"
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A simulation between two steps; `Simulation.restore(state, steps_done, solver)` takes it up again."""
+
+    state: State
+    steps_done: int
+    """how many steps lie behind `state`"""
+    solver: dict[str, FloatArray]
+    """what `solver.save()` gave"""
+
+    @staticmethod
+    def of(simulation: Simulation) -> Checkpoint:
+        """The simulation as it is now. Arrays are not copied: neither time loop nor solver writes into them."""
+        return Checkpoint(simulation.state, simulation.steps_done, simulation.solver.save())
+
+    def write(self, path: Path) -> None:
+        """Write a checkpoint.npz. Raises `WriteError`."""
+        arrays: Arrays = {"step": np.int64(self.steps_done), **_state_arrays(self.state)}
+        if self.state.previous is not None:
+            arrays |= {f"previous_{name}": array for name, array in _state_arrays(self.state.previous).items()}
+        write_arrays(path, arrays | {_SOLVER + name: array for name, array in self.solver.items()})
+
+    @staticmethod
+    def read(path: Path, nodes: int) -> Checkpoint:
+        """Read a checkpoint.npz of a mesh with `nodes` nodes.
+
+        Raises:
+            InputError: it is missing, damaged, or of another mesh.
+        """
+        arrays = read_arrays(path, {"step": (), **_state_shapes("", nodes)})
+        previous = None
+        if "previous_time" in arrays:
+            if set(_state_shapes("previous_", nodes)) - set(arrays):
+                raise InputError(f"{path} is not what it should be: its previous state is not whole")
+            previous = _state(arrays, "previous_", None)
+        solver = {name.removeprefix(_SOLVER): a for name, a in arrays.items() if name.startswith(_SOLVER)}
+        return Checkpoint(_state(arrays, "", previous), int(arrays["step"]), solver)
+
+
+def _state_arrays(state: State) -> Arrays:
+    return {"time": np.float64(state.time), "positions": state.positions, "velocities": state.velocities}  # type: ignore[dict-item]
+
+
+def _state_shapes(prefix: str, nodes: int) -> dict[str, tuple[int | None, ...]]:
+    return {f"{prefix}time": (), f"{prefix}positions": (nodes, 3), f"{prefix}velocities": (nodes, 3)}
+
+
+def _state(arrays: Arrays, prefix: str, previous: State | None) -> State:
+    x, v = arrays[f"{prefix}positions"], arrays[f"{prefix}velocities"]
+    return State(float(arrays[f"{prefix}time"]), x, v, previous)

@@ -1,0 +1,137 @@
+"""Where things lie in a run directory, and what tells it from any other folder.
+
+Format version 1::
+
+    run.json            {"format": "qlb run", "version": 1, "created": ISO 8601}: the marker, written first
+    scene.yaml          the resolved scene
+    mesh.npz            positions [m] (n, 3) at rest, tets (m, 4)
+    frames/000000.npz   step, time [s], positions [m] (n, 3), velocities [m/s] (n, 3); named by the step
+    stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
+    checkpoint.npz      what a run needs to go on to the same bits, as of the last frame
+    summary.json        the run in numbers; its status is "running" until the end
+    *.png, report.html  made from the above by `finish_run`
+
+Every file but stats.csv is written next to its place and moved to it, so that it is whole or not there. A step is
+finished when the checkpoint holds it; rows and frames of later steps are what a kill left behind.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+from qlb.errors import InputError
+from qlb.results.files import temporary_name
+
+FORMAT = "qlb run"
+VERSION = 1
+
+MARKER = "run.json"
+SCENE = "scene.yaml"
+MESH = "mesh.npz"
+FRAMES = "frames"
+STATS = "stats.csv"
+CHECKPOINT = "checkpoint.npz"
+SUMMARY = "summary.json"
+REPORT = "report.html"
+FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals", "seconds")}
+"""Images of a run, by the name that `finish_run` gives them, in the order of the report."""
+
+_FRAME = re.compile(r"(\d{6,})\.npz")
+
+
+def frame_path(directory: Path, step: int) -> Path:
+    """Where the frame of a step lies."""
+    return directory / FRAMES / f"{step:06d}.npz"
+
+
+def frame_steps(directory: Path) -> list[int]:
+    """Steps that have a frame, in order."""
+    folder = directory / FRAMES
+    names = os.listdir(folder) if folder.is_dir() else []
+    return sorted(int(match[1]) for name in names if (match := _FRAME.fullmatch(name)))
+
+
+def check_marker(directory: Path) -> None:
+    """Raise `InputError` unless `directory` holds a run of this format version."""
+    path = directory / MARKER
+    try:
+        marker = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        missing = "it has no run.json" if directory.is_dir() else "there is no such folder"
+        raise InputError(f"{directory} is not a qlb run: {missing}") from None
+    except (ValueError, RecursionError, OSError) as error:
+        raise InputError(f"{directory} is not a qlb run: run.json cannot be read ({_line(error)})") from None
+    if not isinstance(marker, dict) or marker.get("format") != FORMAT:
+        raise InputError(f"{directory} is not a qlb run: run.json does not have format = {FORMAT!r}")
+    if marker.get("version") != VERSION:
+        raise InputError(
+            f"run {directory} has format version {marker.get('version')!r}, this qlb reads {VERSION}; another version of"
+            " qlb wrote it"
+        )
+
+
+def check_free(directory: Path, *, overwrite: bool) -> None:
+    """Raise `InputError` unless `directory` can become a run directory: there is nothing in it, or a run to replace."""
+    if os.path.lexists(directory) and not directory.is_dir():
+        raise InputError(f"output folder {directory} is a file; choose another")
+    if not directory.is_dir():
+        return
+    for folder in (directory, directory / FRAMES):
+        if folder.is_dir() and not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+            raise InputError(f"output folder {directory} cannot be written: no permission; choose another")
+    if not any(directory.iterdir()):
+        return
+    try:
+        check_marker(directory)
+    except InputError:
+        raise InputError(f"output folder {directory} holds files that are not a qlb run; choose another") from None
+    if not overwrite:
+        raise InputError(f"output folder {directory} holds another run; choose another or use --overwrite")
+
+
+def claim(directory: Path, *, overwrite: bool) -> None:
+    """Make `directory` a run directory with nothing but its marker.
+
+    Raises:
+        InputError: it is not free (see `check_free`) or cannot be written.
+    """
+    check_free(directory, overwrite=overwrite)
+    try:
+        if (directory / MARKER).exists():
+            _clear(directory)
+        (directory / FRAMES).mkdir(parents=True, exist_ok=True)
+        created = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        marker = json.dumps({"format": FORMAT, "version": VERSION, "created": created})
+        with (directory / MARKER).open("x", encoding="utf-8") as file:
+            file.write(marker + "\n")
+    except FileExistsError:
+        raise InputError(f"output folder {directory} is in use by another run; choose another") from None
+    except OSError as error:
+        raise InputError(f"output folder {directory} cannot be written: {_line(error)}; choose another") from None
+
+
+def _clear(directory: Path) -> None:
+    """Delete what a run wrote and nothing else; the marker last, so that what is left stays known as a run."""
+    for path in _files(directory):
+        path.unlink(missing_ok=True)
+        temporary_name(path).unlink(missing_ok=True)
+    frames = directory / FRAMES
+    if frames.is_dir() and not any(frames.iterdir()):
+        frames.rmdir()
+    (directory / MARKER).unlink()
+
+
+def _files(directory: Path) -> Iterator[Path]:
+    yield from (frame_path(directory, step) for step in frame_steps(directory))
+    names = (SCENE, MESH, STATS, CHECKPOINT, SUMMARY, REPORT, *FIGURES.values())
+    yield from (directory / name for name in names)
+
+
+def _line(error: Exception) -> str:
+    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return " ".join(text.split())

@@ -1,0 +1,143 @@
+"""Reads a run directory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+
+from qlb.arrays import BoolArray, FloatArray, LongArray
+from qlb.errors import InputError
+from qlb.integrators import State
+from qlb.mesh import TetMesh
+from qlb.results import layout
+from qlb.results.checkpoint import Checkpoint
+from qlb.results.files import read_arrays
+from qlb.results.statistics import Statistics, count_steps, read_statistics, summarise
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The state after a step; step 0 is the initial one."""
+
+    step: int
+    time: float
+    """[s]"""
+    positions: FloatArray
+    """[m], shape (n, 3)"""
+    velocities: FloatArray
+    """[m/s], shape (n, 3)"""
+
+
+class StepIterations(NamedTuple):
+    """Nonlinear iterations by step, each of shape (steps,)."""
+
+    steps: LongArray
+    iterations: LongArray
+    converged: BoolArray
+
+
+class Run:
+    """A run directory, read as needed. Everything raises `InputError` where a file is missing or damaged.
+
+    Raises:
+        InputError: the directory is not a qlb run, or of a format version that this qlb does not know.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = Path(directory)
+        layout.check_marker(self.directory)
+
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """The resolved scene as plain data."""
+        return _parsed(self.directory / layout.SCENE, yaml.safe_load)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """summary.json; of a run that was not finished, with what its statistics say."""
+        summary = _parsed(self.directory / layout.SUMMARY, json.loads)
+        if summary.get("status") == "running":
+            steps = self.iterations_per_step().steps
+            seconds = {part: float(self.stats[f"seconds_{part}"].sum()) for part in summary["seconds"]}
+            summary |= summarise(count_steps(self.stats)) | {"steps": len(steps), "seconds": seconds}
+            summary |= {"wall_seconds": sum(seconds.values()), "time": float(steps.max(initial=0) * summary["step"])}
+        return summary
+
+    @cached_property
+    def mesh(self) -> TetMesh:
+        """The body at rest."""
+        arrays = read_arrays(self.directory / layout.MESH, {"positions": (None, 3), "tets": (None, 4)})
+        return TetMesh(arrays["positions"], arrays["tets"])
+
+    @cached_property
+    def stats(self) -> Statistics:
+        """The columns of stats.csv (`qlb.results.COLUMNS`) by name, each of shape (rows,)."""
+        return read_statistics(self.directory / layout.STATS)
+
+    @property
+    def frame_steps(self) -> list[int]:
+        """Steps that have a frame, in order."""
+        return layout.frame_steps(self.directory)
+
+    def frame(self, step: int) -> Frame:
+        """The frame of a step. Raises `InputError` where there is none."""
+        path = layout.frame_path(self.directory, step)
+        if not path.is_file():
+            have = self.frame_steps
+            raise InputError(f"run {self.directory} has no frame of step {step}, only {_some(have)}")
+        nodes = len(self.mesh.positions)
+        shapes = {"step": (), "time": (), "positions": (nodes, 3), "velocities": (nodes, 3)}
+        arrays = read_arrays(path, shapes)
+        return Frame(int(arrays["step"]), float(arrays["time"]), arrays["positions"], arrays["velocities"])
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame in order, read one by one."""
+        return map(self.frame, self.frame_steps)
+
+    @cached_property
+    def stages(self) -> int:
+        """Solves that most steps have: the stages of the integrator."""
+        whole = self.stats["parts"] == 1
+        steps, stages = self.stats["step"][whole], self.stats["stage"][whole]
+        if len(steps) == 0:
+            return 1
+        each = np.zeros(int(steps.max()) + 1, np.int64)
+        np.maximum.at(each, steps, stages)
+        return int(np.bincount(each[each > 0]).argmax())
+
+    def iterations_per_step(self, stage: int | None = None) -> StepIterations:
+        """Nonlinear iterations of each step that was tried, or of one stage of each step that has it."""
+        counts = count_steps(self.stats, stage)
+        return StepIterations(
+            np.array([c.step for c in counts], np.int64),
+            np.array([c.iterations for c in counts], np.int64),
+            np.array([c.converged for c in counts], bool),
+        )
+
+    def load_checkpoint(self) -> tuple[State, int, dict[str, FloatArray]]:
+        """State, steps done and solver arrays of the last checkpoint: the arguments of `Simulation.restore`."""
+        checkpoint = Checkpoint.read(self.directory / layout.CHECKPOINT, len(self.mesh.positions))
+        return checkpoint.state, checkpoint.steps_done, checkpoint.solver
+
+
+def _parsed(path: Path, parse: Callable[[str], object]) -> dict[str, Any]:
+    try:
+        data = parse(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+    except (ValueError, yaml.YAMLError, RecursionError) as error:
+        raise InputError(f"{path} is damaged: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path} is damaged: it holds {type(data).__name__}, must hold keys and values")
+    return data
+
+
+def _some(steps: list[int]) -> str:
+    return f"{steps[0]} to {steps[-1]} ({len(steps)} frames)" if steps else "none"

@@ -1,0 +1,200 @@
+"""Writes a run directory while a simulation runs."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+import yaml
+
+from qlb import _native
+from qlb.errors import InputError, StepFailed
+from qlb.results import layout
+from qlb.results.checkpoint import Checkpoint
+from qlb.results.clock import LoopClock
+from qlb.results.errors import WriteError
+from qlb.results.files import append_text, write_arrays, write_text
+from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
+from qlb.simulation import Simulation, StepResult
+
+Status = Literal["running", "complete", "failed", "interrupted"]
+
+
+class RunWriter:
+    """Keeps every finished step of a simulation in a directory; see `qlb.results.layout` for what lies there.
+
+    Make it when the simulation is set up (nodes pinned and moved): it has system and solver made, so that its clock
+    counts the time loop alone. As a context manager it finishes the run by itself::
+
+        with RunWriter(Path("out"), {"scene": "mine"}, simulation) as writer:
+            for result in simulation.run(100):
+                writer.record(result)
+
+    Args:
+        directory: where to write; made where it is missing.
+        scene: the resolved scene as plain data, kept as scene.yaml.
+        simulation: what will run.
+        overwrite: replace an earlier run there. Only files that a run wrote are deleted.
+        stride: write a frame and a checkpoint every so many steps; the last step gets them in any case.
+
+    Raises:
+        InputError: the directory holds anything else, is a file, or cannot be written (nothing was changed then); the
+            scene is not plain data; stride < 1.
+        WriteError: a file could not be written, as with a full disk. So do all methods.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        scene: Mapping[str, object],
+        simulation: Simulation,
+        *,
+        overwrite: bool = False,
+        stride: int = 1,
+    ) -> None:
+        if stride < 1:
+            raise InputError(f"stride = {stride} is out of range: must be >= 1")
+        text = _scene_text(scene)
+        layout.check_free(Path(directory), overwrite=overwrite)
+        self.directory = Path(directory)
+        self._simulation = simulation
+        self._stride = stride
+        self._first_step = simulation.steps_done
+        self._counts: list[StepCount] = []
+        self._now = Checkpoint.of(simulation)
+        self._kept = -1
+        self._finished = False
+        layout.claim(self.directory, overwrite=overwrite)
+        write_text(self.directory / layout.SCENE, text)
+        mesh = simulation.mesh
+        write_arrays(self.directory / layout.MESH, {"positions": mesh.positions, "tets": mesh.tets})
+        append_text(self.directory / layout.STATS, HEADER)
+        self._keep()
+        self._clock = LoopClock(simulation.timer)
+        self._write_summary("running", None)
+
+    def record(self, result: StepResult) -> None:
+        """Keep a step that was just taken. Raises `InputError` where the simulation has gone on since."""
+        if result.step != self._simulation.steps_done:
+            raise InputError(
+                f"step {result.step} cannot be recorded: the simulation is at step {self._simulation.steps_done}; record"
+                " each step before the next"
+            )
+        with self._writing():
+            self._add_rows(result)
+            self._now = Checkpoint.of(self._simulation)
+            if (result.step - self._first_step) % self._stride == 0:
+                self._keep()
+
+    def record_failed(self, result: StepResult) -> None:
+        """Keep the statistics of a step that did not converge and was not taken over by the simulation."""
+        with self._writing():
+            self._add_rows(result)
+
+    def finish(self, status: Literal["complete", "failed", "interrupted"], error: str | None = None) -> dict[str, Any]:
+        """Write the last frame, where it is not there yet, and summary.json; returns what that holds."""
+        self._finished = True
+        with self._writing():
+            try:
+                if self._kept != self._now.steps_done:
+                    self._keep()
+            finally:
+                summary = self._write_summary(status, error)
+        return summary
+
+    def __enter__(self) -> Self:
+        """Nothing more to do."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish, unless that was done: complete, interrupted by Ctrl-C, or failed with the error."""
+        if self._finished or isinstance(error, WriteError):
+            return
+        if isinstance(error, StepFailed):
+            self.record_failed(error.result)
+        if error is None:
+            self.finish("complete")
+        elif isinstance(error, KeyboardInterrupt):
+            self.finish("interrupted")
+        else:
+            self.finish("failed", str(error) or type(error).__name__)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Stop the clock, and let errors say what is safe."""
+        with self._clock.stopped():
+            try:
+                yield
+            except WriteError as error:
+                safe = f"steps up to {self._kept} are safe in {self.directory}"
+                raise WriteError(error.path, error.reason, safe) from None
+
+    def _add_rows(self, result: StepResult) -> None:
+        append_text(self.directory / layout.STATS, csv_rows(result))
+        self._counts.append(StepCount.of(result))
+
+    def _keep(self) -> None:
+        """Write the frame, then the checkpoint that makes it count."""
+        state, step = self._now.state, self._now.steps_done
+        frame = {"positions": state.positions, "velocities": state.velocities}
+        write_arrays(
+            layout.frame_path(self.directory, step), {"step": np.int64(step), "time": np.float64(state.time), **frame}
+        )
+        self._now.write(self.directory / layout.CHECKPOINT)
+        self._kept = step
+
+    def _write_summary(self, status: Status, error: str | None) -> dict[str, Any]:
+        clock, simulation = self._clock, self._simulation
+        counted = summarise(self._counts)
+        summary: dict[str, Any] = {
+            "status": status,
+            "error": error,
+            "steps": self._now.steps_done - self._first_step,
+            **counted,
+            "converged": counted["converged"] and status != "failed",
+            "wall_seconds": clock.wall,
+            "cpu_seconds": clock.cpu,
+            "seconds": clock.seconds,
+            "time": self._now.state.time,
+            **_facts(simulation),
+        }
+        write_text(self.directory / layout.SUMMARY, json.dumps(summary, indent=2) + "\n")
+        return summary
+
+
+def _facts(simulation: Simulation) -> dict[str, Any]:
+    """What is known of a run before its first step."""
+    return {
+        "solver": simulation.solver.name,
+        "integrator": simulation._integrator.name,
+        "step": simulation.step,
+        "nodes": len(simulation.mesh.positions),
+        "tets": len(simulation.mesh.tets),
+        "threads": simulation.threads,
+        "tolerance": simulation.tolerance.model_dump(mode="json"),
+        "versions": {
+            "qlb": version("qlb"),
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            **{name: str(value) for name, value in _native.libraries().items()},
+            "simd": _native.simd_levels()[-1],
+        },
+    }
+
+
+def _scene_text(scene: Mapping[str, object]) -> str:
+    try:
+        return yaml.safe_dump(dict(scene), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        raise InputError(
+            f"scene must be plain data (numbers, text, lists, mappings): {str(error).splitlines()[0]}"
+        ) from None
