@@ -147,6 +147,11 @@ class Simulation:
             raise InputError(f"cannot {what} after the first step")
 
     @property
+    def integrator(self) -> Integrator:
+        """The time integrator."""
+        return self._integrator
+
+    @property
     def state(self) -> State:
         """Time, positions and velocities now."""
         return self._state

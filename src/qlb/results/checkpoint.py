@@ -33,7 +33,7 @@ class Checkpoint:
 
     def write(self, path: Path) -> None:
         """Write a checkpoint.npz. Raises `WriteError`."""
-        arrays: Arrays = {"step": np.int64(self.steps_done), **_state_arrays(self.state)}
+        arrays: Arrays = {"step": np.array(self.steps_done), **_state_arrays(self.state)}
         if self.state.previous is not None:
             arrays |= {f"previous_{name}": array for name, array in _state_arrays(self.state.previous).items()}
         write_arrays(path, arrays | {_SOLVER + name: array for name, array in self.solver.items()})
@@ -56,7 +56,7 @@ class Checkpoint:
 
 
 def _state_arrays(state: State) -> Arrays:
-    return {"time": np.float64(state.time), "positions": state.positions, "velocities": state.velocities}  # type: ignore[dict-item]
+    return {"time": np.array(state.time), "positions": state.positions, "velocities": state.velocities}
 
 
 def _state_shapes(prefix: str, nodes: int) -> dict[str, tuple[int | None, ...]]:

@@ -21,7 +21,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 from qlb.errors import InputError
@@ -70,8 +70,8 @@ def check_marker(directory: Path) -> None:
         raise InputError(f"{directory} is not a qlb run: run.json does not have format = {FORMAT!r}")
     if marker.get("version") != VERSION:
         raise InputError(
-            f"run {directory} has format version {marker.get('version')!r}, this qlb reads {VERSION}; another version of"
-            " qlb wrote it"
+            f"run {directory} has format version {marker.get('version')!r}, this qlb reads {VERSION}; it was written"
+            " by another version of qlb"
         )
 
 
@@ -105,7 +105,7 @@ def claim(directory: Path, *, overwrite: bool) -> None:
         if (directory / MARKER).exists():
             _clear(directory)
         (directory / FRAMES).mkdir(parents=True, exist_ok=True)
-        created = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        created = datetime.now(UTC).isoformat(timespec="seconds")
         marker = json.dumps({"format": FORMAT, "version": VERSION, "created": created})
         with (directory / MARKER).open("x", encoding="utf-8") as file:
             file.write(marker + "\n")

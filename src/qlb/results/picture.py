@@ -101,8 +101,8 @@ class _Surface:
 
     @staticmethod
     def of(run: Run, frames: Sequence[Frame]) -> _Surface:
-        nodes, triangles = np.unique(run.mesh.boundary_triangles(), return_inverse=True)
-        triangles = triangles.reshape(-1, 3).astype(np.int32)
+        nodes, renumbered = np.unique(run.mesh.boundary_triangles(), return_inverse=True)
+        triangles = renumbered.reshape(-1, 3).astype(np.int32)
         return _Surface(triangles, run.mesh.positions[nodes], [frame.positions[nodes] for frame in frames])
 
     def displacement(self, x: FloatArray) -> FloatArray:

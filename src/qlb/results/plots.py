@@ -43,6 +43,8 @@ def plot_iterations(runs: Mapping[str, Run], path: Path) -> None:
         for ax, panel in zip(axes, curves, strict=True):
             _mark_failures(ax, panel)
             _iteration_axes(ax, everything)
+            columns = 2 if len(axes) == 1 and len(ax.get_lines()) > 2 else 1
+            ax.legend(loc="upper left", ncols=columns, fontsize=9 if len(axes) == 1 else 8)
         axes[0].set_ylabel("nonlinear iterations")
         style.save(figure, path)
 
@@ -54,7 +56,7 @@ def _draw_run(ax: Axes, index: int, label: str, run: Run) -> StepIterations:
 
 
 def _draw_stages(ax: Axes, label: str, run: Run) -> list[StepIterations]:
-    ax.set_title(label)
+    ax.set_title(_plain(label))
     curves = [run.iterations_per_step(stage) for stage in range(1, run.stages + 1)]
     names = ("first stage", "second stage")[: len(curves)] if len(curves) > 1 else (label,)
     for curve, name, colour in zip(curves, names, (style.BLUE, style.RED), strict=False):
@@ -64,7 +66,7 @@ def _draw_stages(ax: Axes, label: str, run: Run) -> list[StepIterations]:
 
 def _draw_curve(ax: Axes, curve: StepIterations, label: str, colour: str, width: float = 1.6) -> None:
     n = curve.iterations
-    text = f"{label}: mean {n.mean():.3g}, max {n.max()}" if len(n) else f"{label}: no steps"
+    text = _plain(label) + (f": mean {n.mean():.3g}, max {n.max()}" if len(n) else ": no steps")
     failed = int(np.count_nonzero(~curve.converged))
     if failed:
         text += f", {failed} failed"
@@ -90,13 +92,11 @@ def _iteration_axes(ax: Axes, curves: list[StepIterations]) -> None:
         ax.set_ylim(0 if zero else 1, 3 * highest)
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
-        ax.set_ylim(0, 1.25 * max(1, highest))
+        ax.set_ylim(0, 1.3 * max(1, highest))
         ax.yaxis.set_major_locator(_whole_numbers())
     ax.xaxis.set_major_locator(_whole_numbers())
     ax.margins(x=0.02)
     ax.set_xlabel("time step")
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="upper left", ncols=2 if len(ax.get_lines()) > 2 else 1, fontsize=9)
 
 
 def plot_residuals(run: Run, path: Path) -> None:
@@ -204,6 +204,12 @@ def _clip(ax: Axes, steps: LongArray, height: FloatArray) -> None:
     named = [f"step {steps[i]} takes {_seconds_text(1e-3 * height[i])}" for i in out[:3]]
     more = [f"{len(out) - 3} more stick out"] if len(out) > 3 else []
     ax.text(0.99, 0.96, "\n".join(named + more), transform=ax.transAxes, ha="right", va="top", fontsize=9)
+
+
+def _plain(label: str) -> str:
+    """A label as it is: no formula between dollars, and not hidden for an underscore at its start."""
+    text = label.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
 
 
 def _whole_numbers() -> MaxNLocator:

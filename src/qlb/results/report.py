@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 import jinja2
 
+from qlb.errors import InputError
 from qlb.results import layout
 from qlb.results.errors import MissingExtra, RenderingFailed
 from qlb.results.files import write_text
@@ -58,7 +59,7 @@ def finish_run(directory: Path, *, picture: bool = True) -> dict[str, Path]:
     """
     run = Run(directory)
     paths = {name: run.directory / file for name, file in layout.FIGURES.items()}
-    missing = {} if picture else {"picture": "it was not asked for"}
+    missing = {}
     if picture:
         try:
             render_frames(run, paths["picture"])
@@ -76,7 +77,7 @@ def write_report(run: Run, missing: Mapping[str, str] | None = None) -> Path:
 
     Args:
         run: the run.
-        missing: why an image is not there, by its name.
+        missing: why an image is not there, by its name; one that is not there for no reason is passed over.
 
     Raises:
         WriteError: the file could not be written.
@@ -94,7 +95,7 @@ def write_report(run: Run, missing: Mapping[str, str] | None = None) -> Path:
             "factorizations": s["factorizations"],
             "wall time": f"{s['wall_seconds']:.3g} s",
         },
-        "images": [_image(run, name, missing or {}) for name in layout.FIGURES],
+        "images": _images(run, missing or {}),
         "settings": flatten(run.scene),
         "statistics": _statistics(s),
         "versions": s["versions"],
@@ -110,17 +111,21 @@ def write_comparison(runs: Mapping[str, Run], rows: Sequence[Mapping[str, object
     Args:
         runs: the runs by their labels.
         rows: a table; the first value of a row is the label of its run, and links to its report.
-        directory: where to write; links are relative to it.
+        directory: where to write, an existing folder; links are relative to it.
 
     Raises:
+        InputError: there are no runs.
         WriteError: a file could not be written.
     """
+    if not runs:
+        raise InputError("there are no runs to compare")
     plot = directory / layout.FIGURES["iterations"]
     plot_iterations(runs, plot)
     first = next(iter(runs.values()))
+    title = f"{_scene_name(first)}: {', '.join(runs)}"
     names = list(rows[0]) if rows else []
     context = {
-        "title": f"{_scene_name(first)}: {', '.join(runs)}",
+        "title": title,
         "verdict": _verdict_of_all(runs),
         "columns": [_COLUMNS.get(name, name.replace("_", " ")) for name in names],
         "rows": [_table_row(row, runs, directory) for row in rows],
@@ -146,19 +151,31 @@ class Verdict:
 def _verdict(run: Run) -> Verdict:
     s = run.summary
     failed, steps = s["failed_steps"], s["steps"]
-    reasons = failures(run.stats, failed[:8])
-    which = ", ".join(f"{step} ({reason.replace('_', ' ')})" for step, reason in reasons.items())
-    if len(failed) > 8:
-        which += f" and {len(failed) - 8} more"
     if s["status"] == "failed":
         return Verdict("bad", f"Stopped after {_steps(steps)}.", _sentence(s["error"] or "unknown error"))
     if failed:
-        return Verdict("bad", f"{_steps(len(failed))} of {steps} did not converge:", f"{which}.")
+        return Verdict("bad", f"{_steps(len(failed))} of {steps} did not converge:", f"{_which(run, failed)}.")
     if s["status"] == "interrupted":
         return Verdict("warn", f"Interrupted after {_steps(steps)}.", "Every step taken converged.")
     if s["status"] == "running":
         return Verdict("warn", f"Not finished: {_steps(steps)} so far.", "It is still running, or it was killed.")
     return Verdict("good", f"Converged: all {_steps(steps)}.")
+
+
+def _which(run: Run, failed: Sequence[int], most: int = 8) -> str:
+    """Failed steps with their reasons, neighbours with the same reason as one: "3, 5 to 9 (max iterations)"."""
+    groups: list[tuple[int, int, str]] = []
+    for step, reason in failures(run.stats, failed).items():
+        if groups and groups[-1][1] == step - 1 and groups[-1][2] == reason:
+            groups[-1] = (groups[-1][0], step, reason)
+        else:
+            groups.append((step, step, reason))
+    texts = [
+        f"{first if first == last else f'{first} to {last}'} ({reason.replace('_', ' ')})"
+        for first, last, reason in groups[:most]
+    ]
+    more = sum(last - first + 1 for first, last, _ in groups[most:])
+    return ", ".join(texts) + (f" and {more} more" if more else "")
 
 
 def _verdict_of_all(runs: Mapping[str, Run]) -> Verdict:
@@ -243,11 +260,19 @@ def _table_row(row: Mapping[str, object], runs: Mapping[str, Run], directory: Pa
     return {"label": str(label), "link": link, "cells": cells}
 
 
-def _image(run: Run, name: str, missing: Mapping[str, str]) -> dict[str, str | None]:
-    path = run.directory / layout.FIGURES[name]
-    data = _data_uri(path) if path.exists() else None
-    reason = missing.get(name, "it has not been made yet (see `qlb report`)")
-    return {"name": name, "title": _TITLES[name], "alt": _ALT[name], "data": data, "missing": reason}
+def _images(run: Run, missing: Mapping[str, str]) -> list[dict[str, str | None]]:
+    paths = {name: run.directory / file for name, file in layout.FIGURES.items()}
+    return [
+        {
+            "name": name,
+            "title": _TITLES[name],
+            "alt": _ALT[name],
+            "data": _data_uri(path) if path.exists() else None,
+            "missing": missing.get(name),
+        }
+        for name, path in paths.items()
+        if path.exists() or name in missing
+    ]
 
 
 def _data_uri(path: Path) -> str:

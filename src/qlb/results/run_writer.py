@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -78,14 +78,15 @@ class RunWriter:
         append_text(self.directory / layout.STATS, HEADER)
         self._keep()
         self._clock = LoopClock(simulation.timer)
-        self._write_summary("running", None)
+        with self._writing():
+            self._write_summary("running", None)
 
     def record(self, result: StepResult) -> None:
         """Keep a step that was just taken. Raises `InputError` where the simulation has gone on since."""
         if result.step != self._simulation.steps_done:
             raise InputError(
-                f"step {result.step} cannot be recorded: the simulation is at step {self._simulation.steps_done}; record"
-                " each step before the next"
+                f"step {result.step} cannot be recorded: the simulation is at step {self._simulation.steps_done};"
+                " record each step before the next"
             )
         with self._writing():
             self._add_rows(result)
@@ -117,7 +118,7 @@ class RunWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Finish, unless that was done: complete, interrupted by Ctrl-C, or failed with the error."""
-        if self._finished or isinstance(error, WriteError):
+        if self._finished:
             return
         if isinstance(error, StepFailed):
             self.record_failed(error.result)
@@ -126,7 +127,8 @@ class RunWriter:
         elif isinstance(error, KeyboardInterrupt):
             self.finish("interrupted")
         else:
-            self.finish("failed", str(error) or type(error).__name__)
+            with suppress(WriteError) if isinstance(error, WriteError) else nullcontext():
+                self.finish("failed", str(error) or type(error).__name__)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -175,7 +177,7 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
     """What is known of a run before its first step."""
     return {
         "solver": simulation.solver.name,
-        "integrator": simulation._integrator.name,
+        "integrator": simulation.integrator.name,
         "step": simulation.step,
         "nodes": len(simulation.mesh.positions),
         "tets": len(simulation.mesh.tets),

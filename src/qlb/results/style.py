@@ -26,7 +26,7 @@ PARTS = {
 }
 """Colour of each part of a step."""
 
-_SETTINGS: dict[str, Any] = {
+_SETTINGS: Any = {
     "font.family": "sans-serif",
     "font.size": 10,
     "axes.titlesize": 11,

@@ -43,7 +43,7 @@ class Descent(ABC):
         return False
 
     def save(self) -> dict[str, FloatArray]:
-        """Arrays that a resumed run needs to go on to the same bits."""
+        """Arrays that a resumed run needs to go on to the same bits; they must not be changed in place later."""
         return {}
 
     def load(self, arrays: dict[str, FloatArray]) -> None:

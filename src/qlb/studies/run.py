@@ -48,23 +48,18 @@ def run_scene(
         InputError: the scene cannot be built, or the directory cannot be used.
     """
     simulation = scene.build()
-    writer = RunWriter(directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite)
-    status, error = "complete", None
+    plain, stride = scene.model_dump(mode="json"), scene.output.stride
     try:
-        for _ in range(scene.steps):
-            if stop():
-                status = "interrupted"
-                break
-            result = simulation.advance()
-            writer.record(result)
-            on_step(result)
-    except StepFailed as failure:
-        writer.record_failed(failure.result)
+        with RunWriter(directory, plain, simulation, overwrite=overwrite, stride=stride) as writer:
+            for _ in range(scene.steps):
+                if stop():
+                    writer.finish("interrupted")
+                    break
+                result = simulation.advance()
+                writer.record(result)
+                on_step(result)
+    except StepFailed as failure:  # the writer has kept it
         on_step(failure.result)
-        status, error = "failed", str(failure)
     except KeyboardInterrupt:
-        status = "interrupted"
-    except BaseException as crash:
-        writer.finish("failed", f"{type(crash).__name__}: {crash}")
-        raise
-    return Outcome(directory, dict(writer.finish(status, error)))
+        pass
+    return Outcome(directory, Run(directory).summary)

@@ -1,0 +1,141 @@
+"""Report pages: whole, self-contained, escaped, and honest about what is missing."""
+
+from __future__ import annotations
+
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import qlb
+from qlb.results import Run, RunWriter, finish_run, plot_residuals, write_comparison, write_report
+
+VOID = {"meta", "img", "br", "link", "hr"}
+
+
+class Page(HTMLParser):
+    """Checks that tags are balanced, and keeps what a test asks about."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.sources: list[str] = []
+        self.text = ""
+        self.feed(path.read_text(encoding="utf-8"))
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        values = dict(attrs)
+        self.links += [str(values["href"])] if "href" in values else []
+        self.sources += [str(values["src"])] if "src" in values else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_finish_run_makes_everything(make_run, monkeypatch):
+    run = make_run()
+    monkeypatch.setattr("qlb.results.report.render_frames", lambda run, path: path.write_bytes(b"\x89PNG"))
+    files = finish_run(run.directory)
+    assert list(files) == ["picture", "iterations", "residuals", "seconds", "report"]
+    assert all(path.is_file() for path in files.values())
+    page = Page(files["report"])
+    assert len(page.sources) == 4
+    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+    assert "script" not in page.tags
+    assert all((run.directory / link).exists() for link in page.links)
+    assert "Converged: all 3 steps." in page.text
+    assert "material.young" in page.text
+    assert "20000" in page.text
+    assert qlb.__version__ in page.text
+
+
+def test_a_page_shows_values_as_they_are(make_run):
+    evil = '<script>alert(1)</script> & "quotes" {{ 7 * 7 }} ünï'
+    run = make_run(scene={"scene": evil, evil: [evil]})
+    path = finish_run(run.directory, picture=False)["report"]
+    assert "<script" not in path.read_text(encoding="utf-8")
+    page = Page(path)
+    assert page.text.count(evil) >= 4
+    comparison = Page(write_comparison({evil: run}, [{"solver": evil, "note": evil}], run.directory.parent))
+    assert "script" not in comparison.tags
+    assert comparison.text.count(evil) >= 4
+
+
+def test_without_pyvista_the_report_says_so(make_run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    run = make_run()
+    files = finish_run(run.directory)
+    assert "picture" not in files
+    assert 'Left out: a picture needs pyvista: pip install "qlb[view]"' in Page(files["report"]).text
+
+
+def test_a_report_holds_the_images_that_are_there(make_run):
+    run = make_run()
+    assert Page(write_report(run)).sources == []
+    plot_residuals(run, run.directory / "residuals.png")
+    page = Page(write_report(run, {"picture": "no paint"}))
+    assert len(page.sources) == 1
+    assert "Left out: no paint" in page.text
+
+
+def test_failed_steps_are_named_with_reasons(make_run):
+    settings = qlb.SolverSettings(max_iterations=2)
+    never = qlb.Tolerance(relative=0, absolute=0, scaled=0)
+    run = make_run(steps=4, on_failure="accept", tolerance=never, solver_settings=settings)
+    text = Page(write_report(run)).text
+    assert "4 steps of 4 did not converge: 1 to 4 (max iterations)." in text
+    stats = run.directory / "stats.csv"
+    lines = stats.read_text().splitlines()
+    good = [line.replace("max_iterations", "converged_relative") if line.startswith("2,") else line for line in lines]
+    stats.write_text("\n".join(good) + "\n")
+    assert "1 (max iterations), 2 (unknown), 3 to 4 (max iterations)." in Page(write_report(Run(run.directory))).text
+
+
+def test_a_stopped_run_says_why(tmp_path, make_simulation):
+    never = qlb.Tolerance(relative=0, absolute=0, scaled=0)
+    simulation = make_simulation(tolerance=never, solver_settings=qlb.SolverSettings(max_iterations=2))
+    with pytest.raises(qlb.StepFailed), RunWriter(tmp_path / "run", {}, simulation) as writer:
+        writer.record(simulation.advance())
+    text = Page(finish_run(tmp_path / "run", picture=False)["report"]).text
+    assert "Stopped after 0 steps." in text
+    assert "Step 1 (time 0.01 s) did not converge: max_iterations after 2 iterations of QLB" in text
+
+
+def test_other_endings(tmp_path, make_simulation):
+    simulation = make_simulation()
+    writer = RunWriter(tmp_path / "run", {}, simulation)
+    writer.record(simulation.advance())
+    text = Page(finish_run(tmp_path / "run", picture=False)["report"]).text
+    assert "Not finished: 1 step so far." in text
+    writer.finish("interrupted")
+    text = Page(finish_run(tmp_path / "run", picture=False)["report"]).text
+    assert "Interrupted after 1 step." in text
+
+
+def test_a_comparison_links_to_its_reports(make_run, tmp_path):
+    runs = {name: make_run(name, solver=name.split()[0]) for name in ("ND", "QLB 100%")}
+    for run in runs.values():
+        finish_run(run.directory, picture=False)
+    rows = [{"solver": name, "iterations_mean": 7.25, "difference": None} for name in runs]
+    page = Page(write_comparison(runs, rows, tmp_path))
+    assert page.links == ["ND/report.html", "QLB%20100%25/report.html"]
+    assert "iterations, mean" in page.text
+    assert "7.25" in page.text
+    assert "Converged: all steps of all runs." in page.text
+    assert len(page.sources) == 1
+
+
+def test_a_comparison_needs_runs(tmp_path):
+    with pytest.raises(qlb.InputError, match="no runs"):
+        write_comparison({}, [], tmp_path)
