@@ -87,8 +87,8 @@ double chunk_value_gradient(const ChunkData& chunk, const double* x, double* pos
   V total(0.0);
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
     const Mat3<V> F = tets.deformation_gradient(positions);
-    total += tets.volume * material.energy(F);
-    const Mat3<V> P = material.stress(F);
+    Mat3<V> P;
+    total += tets.volume * material.energy_stress(F, P);
     Vec3<V> force[4];  // dE/dx_a = volume P grad N_a
     for (int i = 0; i < 3; ++i) force[0][i] = V(0.0);
     for (int a = 1; a < 4; ++a) {
@@ -120,6 +120,16 @@ void contract_stiffness(const Stiffness9<V>& C, const Tets<V>& tets, Mat3<V> (&H
               tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
     }
   }
+}
+
+template <class M>
+inline constexpr bool has_spectrum = M::hessian_form != HessianForm::kConvexStiffness;
+template <class M>
+inline constexpr bool has_stiffness = M::hessian_form != HessianForm::kSpectrum;
+
+template <class M>
+constexpr bool uses_spectrum(bool project) {
+  return M::hessian_form == HessianForm::kSpectrum || (project && has_spectrum<M>);
 }
 
 template <class V>
@@ -196,10 +206,13 @@ void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
     const Mat3<V> F = tets.deformation_gradient(positions);
     Mat3<V> H[3][3];
-    if (project) {
-      const Svd3<V> svd = svd3(F);
-      contract_spectrum(project_psd(material.spectrum(svd.sigma)), svd, tets, H);
-    } else {
+    if (uses_spectrum<M<V>>(project)) {
+      if constexpr (has_spectrum<M<V>>) {
+        const Svd3<V> svd = svd3(F);
+        const Spectrum<V> spectrum = material.spectrum(svd.sigma);
+        contract_spectrum(project ? project_psd(spectrum) : spectrum, svd, tets, H);
+      }
+    } else if constexpr (has_stiffness<M<V>>) {
       contract_stiffness(material.stiffness(F), tets, H);
     }
     scatter_blocks(tets, H, slot_blocks);
@@ -238,12 +251,19 @@ void lanes_density(const double* F_lanes, const double* parameter_lanes, bool pr
     for (int k = 0; k < M<V>::parameter_count; ++k)
       parameters[k] = V::load_unaligned(parameter_lanes + k * kLanes + lane);
     const M<V> material(parameters);
-    material.energy(F).store_unaligned(energy + lane);
-    const Mat3<V> P = material.stress(F);
+    Mat3<V> P;
+    material.energy_stress(F, P).store_unaligned(energy + lane);
     for (int k = 0; k < 9; ++k) P(k / 3, k % 3).store_unaligned(stress + k * kLanes + lane);
-    const Svd3<V> svd = svd3(F);
-    const Stiffness9<V> C =
-        project ? expand_spectrum(project_psd(material.spectrum(svd.sigma)), svd) : material.stiffness(F);
+    Stiffness9<V> C;
+    if (uses_spectrum<M<V>>(project)) {
+      if constexpr (has_spectrum<M<V>>) {
+        const Svd3<V> svd = svd3(F);
+        const Spectrum<V> spectrum = material.spectrum(svd.sigma);
+        C = expand_spectrum(project ? project_psd(spectrum) : spectrum, svd);
+      }
+    } else if constexpr (has_stiffness<M<V>>) {
+      C = material.stiffness(F);
+    }
     for (int k = 0; k < 81; ++k) C.c[k / 9][k % 9].store_unaligned(stiffness + k * kLanes + lane);
   }
 }

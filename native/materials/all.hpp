@@ -1,6 +1,11 @@
 // Every material, in one list: a new one is added here and nowhere else in C++.
 #pragma once
 
+#include "materials/compressible_neo_hookean.hpp"
+#include "materials/corotational.hpp"
+#include "materials/linear_elastic.hpp"
+#include "materials/mooney_rivlin.hpp"
+#include "materials/st_venant_kirchhoff.hpp"
 #include "materials/stable_neo_hookean.hpp"
 
 namespace qlb {
@@ -8,6 +13,7 @@ namespace qlb {
 template <template <class> class... Materials>
 struct MaterialList {};
 
-using AllMaterials = MaterialList<StableNeoHookean>;
+using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean,
+                                  FixedCorotational, Arap, MooneyRivlin, LinearElastic>;
 
 }  // namespace qlb

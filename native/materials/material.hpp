@@ -4,19 +4,28 @@
 //
 //   static constexpr const char* name            its short name, as in a scene file
 //   static constexpr int parameter_count         doubles per element, in the order its Python class gives
-//   them M(const V* parameters)                       reads them V energy(F) psi [Pa], zero at rest Mat3<V>
-//   stress(F)                            first Piola-Kirchhoff stress dpsi/dF [Pa] Stiffness9<V> stiffness(F)
-//   d2psi/dF2, exact [Pa] Spectrum<V> spectrum(sigma)                  the same in the frame of the SVD
-//   (isotropic materials)
+//   them static constexpr HessianForm hessian_form    which of the two forms below it has M(const V*
+//   parameters)                       reads them V energy(F)                                  psi [Pa], zero
+//   at rest; NaN where psi is not defined V energy_stress(F, P)                        the same, and P =
+//   dpsi/dF, the first Piola-Kirchhoff stress [Pa] Stiffness9<V> stiffness(F)                   d2psi/dF2,
+//   exact [Pa] Spectrum<V> spectrum(sigma)                  the same in the frame of the SVD (isotropic
+//   materials)
 //
-// Stiffness and spectrum are written down independently; a test holds one against the other.
+// Where a material has both forms they are written down independently; a test holds one against the other.
 #pragma once
 
+#include <limits>
 #include <xsimd/xsimd.hpp>
 
 #include "simd/mat3.hpp"
 
 namespace qlb {
+
+enum class HessianForm {
+  kStiffnessAndSpectrum,  // exact Hessians from stiffness(F), projected ones from spectrum(sigma)
+  kSpectrum,              // both from spectrum(sigma)
+  kConvexStiffness,       // stiffness(F) is positive semidefinite as it stands
+};
 
 // d2psi / dF_ik dF_jl at [3 i + k][3 j + l]; symmetric, filled whole.
 template <class V>
@@ -32,5 +41,12 @@ struct Spectrum {
   Mat3<V> scaling;
   Vec3<V> twist, flip;
 };
+
+// log x, NaN for x <= 0.
+template <class V>
+V log_or_nan(const V& x) {
+  const V nan = V(std::numeric_limits<double>::quiet_NaN());
+  return xsimd::select(x > V(0.0), xsimd::log(x), nan);
+}
 
 }  // namespace qlb

@@ -77,6 +77,11 @@ Mat3<V> cofactor(const Mat3<V>& F) {
 }
 
 template <class V>
+V determinant(const Mat3<V>& F) {
+  return dot(column(F, 0), cross(column(F, 1), column(F, 2)));
+}
+
+template <class V>
 Mat3<V> identity3() {
   Mat3<V> I;
   for (int i = 0; i < 3; ++i)

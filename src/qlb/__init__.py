@@ -9,7 +9,15 @@ _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from qlb.errors import InputError, QlbError, StepFailed
 from qlb.integrators import State
-from qlb.materials import StableNeoHookean
+from qlb.materials import (
+    Arap,
+    CompressibleNeoHookean,
+    FixedCorotational,
+    LinearElastic,
+    MooneyRivlin,
+    StableNeoHookean,
+    StVenantKirchhoff,
+)
 from qlb.mesh import TetMesh
 from qlb.simulation import Simulation, StepResult
 from qlb.solvers import Reason, SolverSettings, Tolerance
@@ -18,12 +26,18 @@ from qlb.system import Rotation, Translation
 __version__ = _version("qlb")
 
 __all__ = [
+    "Arap",
+    "CompressibleNeoHookean",
+    "FixedCorotational",
     "InputError",
+    "LinearElastic",
+    "MooneyRivlin",
     "QlbError",
     "Reason",
     "Rotation",
     "Simulation",
     "SolverSettings",
+    "StVenantKirchhoff",
     "StableNeoHookean",
     "State",
     "StepFailed",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
@@ -127,10 +127,13 @@ def _one_line(model: type[BaseModel], error: ValidationError) -> str:
     """The first problem of a ValidationError in one line, and how many there are."""
     problems = error.errors()
     first = problems[0]
-    location = [str(part) for part in first["loc"]]
-    key = ".".join(location) or model.__name__
+    key, beside = _locate(model, first["loc"])
     if first["type"] == "extra_forbidden":
-        text = unknown_key(model, key)
+        text = unknown_key(key, beside)
+    elif first["type"] == "union_tag_invalid":
+        context = first["ctx"]
+        options = context["expected_tags"].replace("'", "")
+        text = f"{key}.model: {context['tag']!r} is not known: must be one of {options}"
     else:
         message = first["msg"].removeprefix("Value error, ")
         own_words = first["type"] == "value_error"
@@ -139,32 +142,56 @@ def _one_line(model: type[BaseModel], error: ValidationError) -> str:
     return text if more == 0 else f"{text} (and {more} more)"
 
 
+def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
+    """The dotted key of an error's location, and the keys that are valid beside it.
+
+    Left out are the tags that pydantic puts into a location for the member of a union.
+    """
+    parts: list[str] = []
+    members, beside = [model], [model]
+    for part in location:
+        tagged = [m for m in members if "model" in m.model_fields and m.model_fields["model"].default == part]
+        if tagged and not any(part in m.model_fields for m in members):
+            members = tagged
+            continue
+        beside = members
+        fields = [m.model_fields[str(part)] for m in members if part in m.model_fields]
+        members = nested_models(fields[0].annotation) if fields else []
+        parts.append(str(part))
+    prefix = "".join(f"{part}." for part in parts[:-1])
+    return ".".join(parts), [prefix + name for m in beside for name in m.model_fields]
+
+
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def unknown_key(model: type[BaseModel], key: str) -> str:
-    """The error for a key that `model` does not have, with the nearest that it has."""
-    valid = list(key_fields(model))
-    near = difflib.get_close_matches(key, valid, n=1, cutoff=0.5)
+def unknown_key(key: str, valid: Iterable[str]) -> str:
+    """The error for a key that is not one of `valid`, with the nearest that is."""
+    valid = list(valid)
+    near = difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
     hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(valid)}"
     return f"unknown key '{key}'; {hint}"
 
 
 def key_fields(model: type[BaseModel], prefix: str = "") -> dict[str, FieldInfo]:
-    """Every key of a settings model, dotted, with its field: `{"mesh.size": ..., "step": ...}`."""
+    """Every key of a settings model, dotted, with its field: `{"mesh.size": ..., "step": ...}`.
+
+    Where a key holds one of several models, such as a material, the keys of all are there.
+    """
     fields: dict[str, FieldInfo] = {}
     for name, field in model.model_fields.items():
-        inner = _nested_model(field.annotation)
-        if inner is None:
+        inner = nested_models(field.annotation)
+        for member in inner:
+            fields |= key_fields(member, f"{prefix}{name}.")
+        if not inner:
             fields[prefix + name] = field
-        else:
-            fields |= key_fields(inner, f"{prefix}{name}.")
     return fields
 
 
-def _nested_model(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return None
+def nested_models(annotation: Any) -> list[type[BaseModel]]:
+    """The settings models that a field can hold: one, the members of a union, or none."""
+    if isinstance(annotation, type):
+        return [annotation] if issubclass(annotation, BaseModel) else []
+    return [model for argument in get_args(annotation) for model in nested_models(argument)]

@@ -63,7 +63,7 @@ class Material(Settings):
 
 
 class IsotropicMaterial(Material):
-    """An isotropic material given by Young's modulus and Poisson's ratio."""
+    """An isotropic material given by Young's modulus and Poisson's ratio of small strains."""
 
     young: PerElement = quantity(2e4, "Young's modulus", unit="Pa", gt=0)
     poisson: PerElement = quantity(0.49, "Poisson's ratio", gt=-1, lt=0.5)
@@ -76,6 +76,10 @@ class IsotropicMaterial(Material):
         """Lame's constants (mu, lambda) [Pa] of linear elasticity."""
         mu = self.young / (2 * (1 + self.poisson))
         return mu, self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+
+    def kernel_parameters(self) -> tuple[PerElement, ...]:
+        """mu and lambda, unless a material says otherwise."""
+        return self.lame()
 
 
 def per_element(material: Material, value: PerElement, elements: int) -> FloatArray:

@@ -57,8 +57,9 @@ def _override(kind: type[Scene], data: dict[str, Any], override: str) -> None:
     key = key.strip()
     if not separator or not key:
         raise InputError(f"--set {override!r} must have the form KEY=VALUE")
-    if key not in key_fields(kind):
-        raise InputError(unknown_key(kind, key))
+    valid = key_fields(kind)
+    if key not in valid:
+        raise InputError(unknown_key(key, valid))
     *parents, last = key.split(".")
     for parent in parents:
         inner = data.setdefault(parent, {})
