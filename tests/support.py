@@ -12,8 +12,9 @@ from qlb.system import HeldNodes, System
 
 Array = NDArray[np.float64]
 
-# Close to what rounding allows: solves end where |g| cannot get smaller in double precision.
-TIGHT = Tolerance(relative=1e-11, scaled=1e-15)
+# Close to what rounding allows. The absolute part ends solves with a tiny step, whose whole |g(x_k)| is small:
+# 2e-14 kg m is an error of 1e-14 m in the place of a node of 2 kg.
+TIGHT = Tolerance(relative=1e-11, absolute=2e-14)
 ROBUST_NEWTON = SolverSettings(projection="on-demand")
 
 

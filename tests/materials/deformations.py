@@ -22,6 +22,10 @@ def random(rng: np.random.Generator) -> Array:
     return np.eye(3) + rng.normal(size=(COUNT, 3, 3))
 
 
+def random_upright(rng: np.random.Generator) -> Array:
+    return np.concatenate([from_stretches(rng, *rng.uniform(0.4, 2.5, 3)) for _ in range(3)])
+
+
 def near_rest(rng: np.random.Generator) -> Array:
     return np.eye(3) + 1e-3 * rng.normal(size=(COUNT, 3, 3))
 
@@ -35,6 +39,7 @@ def inverted(rng: np.random.Generator) -> Array:
 # All that any material must get right, by name.
 KINDS = {
     "random": random,
+    "random, not inverted": random_upright,
     "near rest": near_rest,
     "at rest": lambda rng: np.eye(3)[None],
     "rotated": lambda rng: from_stretches(rng, 1, 1, 1),
@@ -53,3 +58,15 @@ KINDS = {
         [np.diag(d) for d in [(1.0, 1.0, -1.0), (1.0, -1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0)]]
     ),
 }
+
+# psi has log J or J^-2/3: only det F > 0.
+UPRIGHT = ["random, not inverted", "near rest", "at rest", "rotated", "two stretches equal", "stretches nearly equal"]
+# R is not unique where two stretches add up to zero, nor is it smooth near there.
+UNIQUE_ROTATION = [*UPRIGHT, "rank two"]
+
+
+def kinds_for(name: str) -> list[str]:
+    """The kinds of F at which a material and its derivatives are defined."""
+    if name in ("CNH", "MR"):
+        return UPRIGHT
+    return UNIQUE_ROTATION if name in ("ARAP", "corotational") else list(KINDS)

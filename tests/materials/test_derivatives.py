@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from qlb.materials import IsotropicMaterial
+from qlb.materials import Material
 from tests.support import Array, difference
 
 UNITS = np.eye(9).reshape(9, 3, 3)
@@ -10,7 +10,7 @@ UNITS = np.eye(9).reshape(9, 3, 3)
 STEP = 1e-3
 
 
-def test_stress_is_the_derivative_of_the_energy(material: IsotropicMaterial, level: str, F: Array) -> None:
+def test_stress_is_the_derivative_of_the_energy(material: Material, level: str, F: Array) -> None:
     def energy(G: Array) -> Array:
         return material.evaluate(G, simd_level=level)[0]
 
@@ -20,7 +20,7 @@ def test_stress_is_the_derivative_of_the_energy(material: IsotropicMaterial, lev
     np.testing.assert_allclose(measured, stress.reshape(-1, 9), rtol=0, atol=1e-8 * scale)
 
 
-def test_stiffness_is_the_derivative_of_the_stress(material: IsotropicMaterial, level: str, F: Array) -> None:
+def test_stiffness_is_the_derivative_of_the_stress(material: Material, level: str, F: Array) -> None:
     def stress(G: Array) -> Array:
         return material.evaluate(G, simd_level=level)[1]
 
@@ -30,7 +30,7 @@ def test_stiffness_is_the_derivative_of_the_stress(material: IsotropicMaterial, 
     np.testing.assert_allclose(measured, stiffness, rtol=0, atol=1e-8 * scale)
 
 
-def test_stiffness_is_symmetric(material: IsotropicMaterial, level: str, F: Array) -> None:
+def test_stiffness_is_symmetric(material: Material, level: str, F: Array) -> None:
     for project in (False, True):
         stiffness = material.evaluate(F, project=project, simd_level=level)[2]
         np.testing.assert_allclose(

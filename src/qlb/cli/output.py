@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 console = Console()
 errors = Console(stderr=True)
@@ -39,9 +39,9 @@ def _verdict(summary: Mapping[str, Any]) -> str:
 
 def print_comparison(rows: Sequence[Mapping[str, Any]], report: Path) -> None:
     """The table of `qlb compare`."""
-    table = Table(
-        "solver", "steps", "failed", "mean it.", "max it.", "factor.", "wall s", "CPU s", "final state off by"
-    )
+    table = Table(Column("solver", overflow="fold"), "steps", "failed", "mean", "max", "factors", "CPU s", "off by")
+    for column in table.columns[1:]:
+        column.justify, column.no_wrap = "right", True
     for row in rows:
         difference = row["difference"]
         table.add_row(
@@ -51,13 +51,13 @@ def print_comparison(rows: Sequence[Mapping[str, Any]], report: Path) -> None:
             f"{row['iterations_mean']:.2f}",
             str(row["iterations_max"]),
             str(row["factorizations"]),
-            f"{row['wall_seconds']:.2f}",
             f"{row['cpu_seconds']:.2f}",
             "-" if difference is None else f"{difference:.1e}",
         )
     console.print(table)
     console.print(
-        f"final state: largest distance of a node from that of {rows[0]['solver']}, over the longest side of the body",
+        "mean, max: nonlinear iterations a step; factors: Cholesky factorizations; off by: largest distance of a node"
+        f" of the final state from that of {rows[0]['solver']}, over the longest side of the body",
         soft_wrap=True,
     )
     console.print(f"report      {escape(str(report))}", soft_wrap=True, highlight=False)

@@ -1,6 +1,6 @@
 """Hyperelastic materials. Each is one class here and one header in native/materials."""
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Discriminator, Tag
 
@@ -31,7 +31,7 @@ AnyMaterial = Annotated[
 """Any material, told apart by `model`: the one list of materials."""
 
 MATERIALS: dict[str, type[Material]] = {
-    tag.tag: cls for cls, tag in ((m.__origin__, m.__metadata__[0]) for m in AnyMaterial.__origin__.__args__)
+    tag.tag: material for material, tag in map(get_args, get_args(get_args(AnyMaterial)[0]))
 }
 """Every material by the name that scene files use."""
 
