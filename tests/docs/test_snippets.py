@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from qlb.cli.main import main
+from qlb.materials import MATERIALS
+from qlb.results import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -51,3 +53,13 @@ def test_local_links_lead_somewhere():
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_every_column_of_the_statistics_is_explained():
+    page = (ROOT / "docs" / "run-directory.md").read_text()
+    assert all(f"| `{name}` |" in page for name in COLUMNS)
+
+
+def test_every_material_is_in_the_method():
+    page = (ROOT / "docs" / "method.md").read_text()
+    assert all(f"| `{name}` |" in page for name in MATERIALS)

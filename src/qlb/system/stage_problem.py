@@ -43,14 +43,13 @@ class StageProblem:
 
     def value_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
         """E and its gradient at positions `x` [m]: kg m^2 and kg m (J and N in quasistatics), gradient (n, 3)."""
+        system, gradient = self.system, -self._load
         with self.timer.section("gradient"):
-            system = self.system
-            gradient = -self._load
             energy = self._load_at_rest - system.dot(self._load, x)
             energy += system.elastic.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
-            return energy, system.clear_held(gradient)
+        return energy, system.clear_held(gradient)
 
     def hessian(self, x: FloatArray, *, project: bool) -> _native.BlockMatrix:
         """H = (1 + c alpha) M + c^2 d2Psi/dx2 at `x`, each element's part projected to PSD where asked.
