@@ -10,8 +10,8 @@ BlockPattern::BlockPattern(std::int64_t nodes, std::span<const std::int32_t> cli
     : nodes_(nodes) {
   for (const std::int32_t node : cliques)
     if (node < 0 || node >= nodes)
-      throw std::invalid_argument("node index " + std::to_string(node) + " is outside [0, " +
-                                  std::to_string(nodes) + ")");
+      throw std::invalid_argument("node index " + std::to_string(node) + " is outside [0, " + std::to_string(nodes) +
+                                  ")");
 
   // Two passes over all pairs: count the entries of each column, then fill; duplicates go in the sort below.
   const auto for_each_pair = [&](auto&& visit) {
@@ -46,8 +46,7 @@ std::int64_t BlockPattern::find(std::int32_t i, std::int32_t j) const {
   const auto first = row_.begin() + column_begin_[column], last = row_.begin() + column_begin_[column + 1];
   const auto found = std::lower_bound(first, last, row);
   if (found == last || *found != row)
-    throw std::out_of_range("block (" + std::to_string(i) + ", " + std::to_string(j) +
-                            ") is not in the pattern");
+    throw std::out_of_range("block (" + std::to_string(i) + ", " + std::to_string(j) + ") is not in the pattern");
   return found - row_.begin();
 }
 

@@ -25,16 +25,13 @@ void bind_assembly(nb::module_& m) {
       .def_prop_ro(
           "rows",
           [](const BlockPattern& p) {
-            return nb::ndarray<nb::numpy, const std::int32_t, nb::ndim<1>>(p.rows().data(),
-                                                                           {p.rows().size()});
+            return nb::ndarray<nb::numpy, const std::int32_t, nb::ndim<1>>(p.rows().data(), {p.rows().size()});
           },
           nb::rv_policy::reference_internal);
 
   nb::class_<BlockMatrix>(m, "BlockMatrix", "Symmetric matrix of 3x3 node blocks over a BlockPattern.")
       .def("__init__",
-           [](BlockMatrix* self, std::shared_ptr<BlockPattern> pattern) {
-             new (self) BlockMatrix(std::move(pattern));
-           })
+           [](BlockMatrix* self, std::shared_ptr<BlockPattern> pattern) { new (self) BlockMatrix(std::move(pattern)); })
       .def_prop_ro(
           "values",
           [](BlockMatrix& a) {

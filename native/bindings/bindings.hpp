@@ -28,8 +28,8 @@ std::span<T> view(const Array<T>& array) {
 template <class T>
 T* sized(const Array<T>& array, std::int64_t size, const char* name) {
   if (static_cast<std::int64_t>(array.size()) != size)
-    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) +
-                                " entries, expected " + std::to_string(size));
+    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) + " entries, expected " +
+                                std::to_string(size));
   return array.data();
 }
 

@@ -11,10 +11,9 @@ namespace {
 
 // The density of `material` at each F (count, 3, 3): fills energy (count), stress (count, 9), stiffness
 // (count, 81).
-void evaluate_density(const std::string& material, const Array<const double>& F,
-                      const Array<const double>& parameters, bool project, const Array<double>& energy,
-                      const Array<double>& stress, const Array<double>& stiffness,
-                      const std::string& simd_level) {
+void evaluate_density(const std::string& material, const Array<const double>& F, const Array<const double>& parameters,
+                      bool project, const Array<double>& energy, const Array<double>& stress,
+                      const Array<double>& stiffness, const std::string& simd_level) {
   const MaterialKernels& kernels = find_kernels(material, simd_level);
   const auto count = static_cast<std::int64_t>(F.size()) / 9;
   const int width = kernels.parameter_count;
@@ -22,8 +21,8 @@ void evaluate_density(const std::string& material, const Array<const double>& F,
   sized(energy, count, "energy");
   sized(stress, 9 * count, "stress");
   sized(stiffness, 81 * count, "stiffness");
-  std::vector<double> in(9 * kLanes), par(static_cast<std::size_t>(width) * kLanes), psi(kLanes),
-      P(9 * kLanes), C(81 * kLanes);
+  std::vector<double> in(9 * kLanes), par(static_cast<std::size_t>(width) * kLanes), psi(kLanes), P(9 * kLanes),
+      C(81 * kLanes);
   for (std::int64_t first = 0; first < count; first += kLanes) {
     const auto lanes = static_cast<int>(std::min<std::int64_t>(kLanes, count - first));
     for (int l = 0; l < kLanes; ++l) {
@@ -58,13 +57,9 @@ void bind_energies(nb::module_& m) {
              const Array<const double>& parameters, int threads, const std::string& simd_level) {
             new (self) ElasticEnergy(std::move(blocks), material, view(parameters), threads, simd_level);
           },
-          nb::arg("blocks"), nb::arg("material"), nb::arg("parameters"), nb::arg("threads"),
-          nb::arg("simd_level") = "")
+          nb::arg("blocks"), nb::arg("material"), nb::arg("parameters"), nb::arg("threads"), nb::arg("simd_level") = "")
       .def(
-          "value",
-          [](ElasticEnergy& e, const Array<const double>& x) {
-            return e.value(sized(x, 3 * e.nodes(), "x"));
-          },
+          "value", [](ElasticEnergy& e, const Array<const double>& x) { return e.value(sized(x, 3 * e.nodes(), "x")); },
           nb::arg("x"), ReleaseGil())
       .def(
           "add_value_gradient",
@@ -75,16 +70,16 @@ void bind_energies(nb::module_& m) {
           nb::arg("x"), nb::arg("scale"), nb::arg("gradient").noconvert(), ReleaseGil())
       .def(
           "add_hessian",
-          [](ElasticEnergy& e, const Array<const double>& x, double scale, bool project,
-             BlockMatrix& matrix) { e.add_hessian(sized(x, 3 * e.nodes(), "x"), scale, project, matrix); },
+          [](ElasticEnergy& e, const Array<const double>& x, double scale, bool project, BlockMatrix& matrix) {
+            e.add_hessian(sized(x, 3 * e.nodes(), "x"), scale, project, matrix);
+          },
           nb::arg("x"), nb::arg("scale"), nb::arg("project"), nb::arg("matrix"), ReleaseGil());
 
   nb::class_<Inertia>(m, "Inertia")
       .def(
           "__init__",
-          [](Inertia* self, const Array<const std::int64_t>& row_begin,
-             const Array<const std::int32_t>& columns, const Array<const double>& values,
-             std::shared_ptr<BlockPattern> pattern, int threads) {
+          [](Inertia* self, const Array<const std::int64_t>& row_begin, const Array<const std::int32_t>& columns,
+             const Array<const double>& values, std::shared_ptr<BlockPattern> pattern, int threads) {
             new (self) Inertia(view(row_begin), view(columns), view(values), std::move(pattern), threads);
           },
           nb::arg("row_begin"), nb::arg("columns"), nb::arg("values"), nb::arg("pattern"), nb::arg("threads"))

@@ -15,8 +15,7 @@ void bind_linalg(nb::module_& m) {
           },
           nb::arg("b"), nb::arg("x").noconvert(), ReleaseGil());
 
-  nb::class_<Cholesky, InverseOperator>(m, "Cholesky",
-                                        "Sparse Cholesky factor: analysed once, factorised many times.")
+  nb::class_<Cholesky, InverseOperator>(m, "Cholesky", "Sparse Cholesky factor: analysed once, factorised many times.")
       .def("factorise", &Cholesky::factorise, nb::arg("matrix"), ReleaseGil(),
            "Factorises; returns -1, or the degree of freedom (3 node + axis) whose pivot is not positive.")
       .def_prop_ro("factor_nonzeros", &Cholesky::factor_nonzeros)
@@ -25,22 +24,20 @@ void bind_linalg(nb::module_& m) {
   nb::class_<CholmodCholesky, Cholesky>(m, "CholmodCholesky")
       .def(
           "__init__",
-          [](CholmodCholesky* self, std::shared_ptr<BlockPattern> pattern,
-             const Array<const std::uint8_t>& fixed,
+          [](CholmodCholesky* self, std::shared_ptr<BlockPattern> pattern, const Array<const std::uint8_t>& fixed,
              int threads) { new (self) CholmodCholesky(std::move(pattern), view(fixed), threads); },
           nb::arg("pattern"), nb::arg("fixed"), nb::arg("threads"), ReleaseGil());
 
-  nb::class_<Lbfgs>(m, "Lbfgs",
-                    "Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).")
+  nb::class_<Lbfgs>(m, "Lbfgs", "Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).")
       .def(nb::init<std::int64_t, int, int>(), nb::arg("size"), nb::arg("window"), nb::arg("threads"))
       .def_prop_ro("pairs", &Lbfgs::pairs)
       .def("clear", &Lbfgs::clear)
       .def(
           "push",
-          [](Lbfgs& h, const Array<const double>& x_old, const Array<const double>& x,
-             const Array<const double>& g_old, const Array<const double>& g) {
-            return h.push(sized(x_old, h.size(), "x_old"), sized(x, h.size(), "x"),
-                          sized(g_old, h.size(), "g_old"), sized(g, h.size(), "g"));
+          [](Lbfgs& h, const Array<const double>& x_old, const Array<const double>& x, const Array<const double>& g_old,
+             const Array<const double>& g) {
+            return h.push(sized(x_old, h.size(), "x_old"), sized(x, h.size(), "x"), sized(g_old, h.size(), "g_old"),
+                          sized(g, h.size(), "g"));
           },
           nb::arg("x_old"), nb::arg("x"), nb::arg("g_old"), nb::arg("g"), ReleaseGil())
       .def(

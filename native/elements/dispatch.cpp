@@ -16,8 +16,7 @@ std::vector<Level> usable_levels() {
   levels.push_back({"sse2", kernels_SSE2()});
 #endif
 #ifdef QLB_HAS_AVX2
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-    levels.push_back({"avx2", kernels_AVX2()});
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) levels.push_back({"avx2", kernels_AVX2()});
 #endif
 #ifdef QLB_HAS_AVX512
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("fma"))

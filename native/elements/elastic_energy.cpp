@@ -15,14 +15,14 @@ int threads_worth(std::size_t chunks, int threads) {
 }
 
 // target[t, :] += scale * (sum of its slots), in the fixed order of the lists.
-template <int N>
+template <int N, int Stride = N>
 void add_slots(const SlotLists& lists, const double* slots, double scale, double* target, int threads) {
   const auto targets = static_cast<std::int64_t>(lists.begin.size()) - 1;
 #pragma omp parallel for schedule(static) num_threads(threads)
   for (std::int64_t t = 0; t < targets; ++t) {
     double sum[N] = {};
     for (std::int64_t k = lists.begin[t]; k < lists.begin[t + 1]; ++k) {
-      const double* slot = slots + N * static_cast<std::int64_t>(lists.slot[k]);
+      const double* slot = slots + Stride * static_cast<std::int64_t>(lists.slot[k]);
       for (int i = 0; i < N; ++i) sum[i] += slot[i];
     }
     for (int i = 0; i < N; ++i) target[N * t + i] += scale * sum[i];
@@ -41,8 +41,8 @@ ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std:
     throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) +
                                 " parameters per element");
   parameters_ = blocks_->scatter(parameters, count);
-  positions_.resize(4 * blocks_->slot_node.size());
-  slot_gradient_.resize(3 * blocks_->slot_node.size());
+  positions_.resize(kStride * blocks_->slot_node.size());
+  slot_gradient_.resize(kStride * blocks_->slot_node.size());
   chunk_energy_.resize(blocks_->chunks.size());
 }
 
@@ -65,7 +65,7 @@ void ElasticEnergy::for_each_chunk(const Kernel& kernel) {
 #pragma omp parallel for schedule(dynamic) num_threads(threads_)
   for (std::int64_t k = 0; k < count; ++k) {
     const Chunk& chunk = blocks_->chunks[k];
-    kernel(k, chunk, chunk_data(chunk), positions_.data() + 4 * chunk.first_slot);
+    kernel(k, chunk, chunk_data(chunk), positions_.data() + kStride * chunk.first_slot);
   }
 }
 
@@ -78,10 +78,9 @@ double ElasticEnergy::value(const double* x) {
 
 double ElasticEnergy::add_value_gradient(const double* x, double scale, double* gradient) {
   for_each_chunk([&](std::int64_t k, const Chunk& chunk, const ChunkData& data, double* scratch) {
-    chunk_energy_[k] =
-        kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + 3 * chunk.first_slot);
+    chunk_energy_[k] = kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + kStride * chunk.first_slot);
   });
-  add_slots<3>(blocks_->node_slots, slot_gradient_.data(), scale, gradient, threads_);
+  add_slots<3, kStride>(blocks_->node_slots, slot_gradient_.data(), scale, gradient, threads_);
   return scale * std::accumulate(chunk_energy_.begin(), chunk_energy_.end(), 0.0);
 }
 

@@ -34,8 +34,8 @@ class ElasticEnergy {
   const MaterialKernels* kernels_;
   Aligned<double> parameters_;
   int threads_;
-  Aligned<double> positions_;      // (slots, 4)
-  Aligned<double> slot_gradient_;  // (slots, 3)
+  Aligned<double> positions_;      // (slots, kStride)
+  Aligned<double> slot_gradient_;  // (slots, kStride)
   Aligned<double> slot_blocks_;    // (block slots, 3, 3)
   std::vector<double> chunk_energy_;
 };

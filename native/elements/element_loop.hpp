@@ -27,19 +27,17 @@ struct Tets {
   }
 
   Mat3<V> deformation_gradient(const double* positions) const {
-    const Vec3<V> x0 = gather<V>(positions, vertex);
+    const Vec3<V> x0 = Gather<V>::positions(positions, vertex);
     Mat3<V> Ds;
     for (int a = 0; a < 3; ++a) {
-      const Vec3<V> xa = gather<V>(positions, vertex + (a + 1) * kLanes);
+      const Vec3<V> xa = Gather<V>::positions(positions, vertex + (a + 1) * kLanes);
       set_column(Ds, a, {xa[0] - x0[0], xa[1] - x0[1], xa[2] - x0[2]});
     }
     return Ds * Dm_inverse;
   }
 
   // Gradient of the shape function of vertex a = 1, 2, 3; that of vertex 0 is minus their sum.
-  Vec3<V> shape_gradient(int a) const {
-    return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)};
-  }
+  Vec3<V> shape_gradient(int a) const { return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)}; }
 };
 
 template <class M, class V>
@@ -61,8 +59,7 @@ void for_each_tets(const ChunkData& chunk, const Visit& visit) {
 // The chunk's own copy of its node positions, padded to 4 doubles a node.
 static inline void load_positions(const ChunkData& chunk, const double* x, double* positions) {
   for (std::int64_t s = 0; s < chunk.slots; ++s)
-    for (int c = 0; c < 3; ++c)
-      positions[4 * s + c] = x[3 * static_cast<std::int64_t>(chunk.slot_node[s]) + c];
+    for (int c = 0; c < 3; ++c) positions[kStride * s + c] = x[3 * static_cast<std::int64_t>(chunk.slot_node[s]) + c];
 }
 
 static inline void set_zero(double* values, std::int64_t count) {
@@ -80,10 +77,9 @@ double chunk_value(const ChunkData& chunk, const double* x, double* positions) {
 }
 
 template <class V, template <class> class M>
-double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions,
-                            double* slot_gradient) {
+double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions, double* slot_gradient) {
   load_positions(chunk, x, positions);
-  set_zero(slot_gradient, 3 * chunk.slots);
+  set_zero(slot_gradient, kStride * chunk.slots);
   V total(0.0);
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
     const Mat3<V> F = tets.deformation_gradient(positions);
@@ -98,7 +94,7 @@ double chunk_value_gradient(const ChunkData& chunk, const double* x, double* pos
         force[0][i] -= force[a][i];
       }
     }
-    for (int a = 0; a < 4; ++a) scatter_add<V, 3>(force[a].data(), tets.vertex + a * kLanes, slot_gradient);
+    for (int a = 0; a < 4; ++a) Scatter<V>::add_vector(force[a], tets.vertex + a * kLanes, slot_gradient);
   });
   return xsimd::hadd(total);
 }
@@ -110,14 +106,12 @@ void contract_stiffness(const Stiffness9<V>& C, const Tets<V>& tets, Mat3<V> (&H
     const Vec3<V> gb = tets.shape_gradient(b + 1);
     V T[9][3];
     for (int p = 0; p < 9; ++p)
-      for (int j = 0; j < 3; ++j)
-        T[p][j] = C.c[p][3 * j] * gb[0] + C.c[p][3 * j + 1] * gb[1] + C.c[p][3 * j + 2] * gb[2];
+      for (int j = 0; j < 3; ++j) T[p][j] = C(p, 3 * j) * gb[0] + C(p, 3 * j + 1) * gb[1] + C(p, 3 * j + 2) * gb[2];
     for (int a = 0; a <= b; ++a) {
       const Vec3<V> ga = tets.shape_gradient(a + 1);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-          H[a][b](i, j) =
-              tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
+          H[a][b](i, j) = tets.volume * (ga[0] * T[3 * i][j] + ga[1] * T[3 * i + 1][j] + ga[2] * T[3 * i + 2][j]);
     }
   }
 }
@@ -160,8 +154,8 @@ void contract_spectrum(const Spectrum<V>& S, const Svd3<V>& svd, const Tets<V>& 
         for (int j = 0; j < 3; ++j) {
           if (i == j) {
             const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-            local(i, i) = S.scaling(i, i) * g[a][i] * g[b][i] + same[i2] * g[a][i1] * g[b][i1] +
-                          same[i1] * g[a][i2] * g[b][i2];
+            local(i, i) =
+                S.scaling(i, i) * g[a][i] * g[b][i] + same[i2] * g[a][i1] * g[b][i1] + same[i1] * g[a][i2] * g[b][i2];
           } else {
             local(i, j) = S.scaling(i, j) * g[a][i] * g[b][j] + mixed[3 - i - j] * g[a][j] * g[b][i];
           }
@@ -188,19 +182,18 @@ void scatter_blocks(const Tets<V>& tets, const Mat3<V> (&H)[3][3], double* slot_
       }
     }
   int pair = 0;
-  for (int a = 0; a < 4; ++a) scatter_add<V, 9>(&first[a].m[0][0], tets.pair + pair++ * kLanes, slot_blocks);
+  for (int a = 0; a < 4; ++a) Scatter<V>::add_matrix(first[a], tets.pair + pair++ * kLanes, slot_blocks);
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b) {
       Mat3<V> lower;
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) lower(i, j) = H[a][b](j, i);
-      scatter_add<V, 9>(&lower.m[0][0], tets.pair + pair++ * kLanes, slot_blocks);
+      Scatter<V>::add_matrix(lower, tets.pair + pair++ * kLanes, slot_blocks);
     }
 }
 
 template <class V, template <class> class M>
-void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double* positions,
-                   double* slot_blocks) {
+void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double* positions, double* slot_blocks) {
   load_positions(chunk, x, positions);
   set_zero(slot_blocks, 9 * chunk.block_slots);
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
@@ -223,12 +216,12 @@ void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double
 template <class V>
 Stiffness9<V> expand_spectrum(const Spectrum<V>& S, const Svd3<V>& svd) {
   Stiffness9<V> C;
-  for (auto& row : C.c)
-    for (V& c : row) c = V(0.0);
+  for (int p = 0; p < 9; ++p)
+    for (int q = 0; q <= p; ++q) C(p, q) = V(0.0);
   const auto add = [&](const V& weight, int i, int k, int j, int l) {
     for (int p = 0; p < 9; ++p)
-      for (int q = 0; q < 9; ++q)
-        C.c[p][q] += weight * (svd.U(p / 3, i) * svd.R(p % 3, k)) * (svd.U(q / 3, j) * svd.R(q % 3, l));
+      for (int q = 0; q <= p; ++q)
+        C(p, q) += weight * (svd.U(p / 3, i) * svd.R(p % 3, k)) * (svd.U(q / 3, j) * svd.R(q % 3, l));
   };
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
@@ -242,8 +235,8 @@ Stiffness9<V> expand_spectrum(const Spectrum<V>& S, const Svd3<V>& svd) {
 }
 
 template <class V, template <class> class M>
-void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy,
-                   double* stress, double* stiffness) {
+void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy, double* stress,
+                   double* stiffness) {
   for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
     Mat3<V> F;
     for (int k = 0; k < 9; ++k) F(k / 3, k % 3) = V::load_unaligned(F_lanes + k * kLanes + lane);
@@ -264,7 +257,7 @@ void lanes_density(const double* F_lanes, const double* parameter_lanes, bool pr
     } else if constexpr (has_stiffness<M<V>>) {
       C = material.stiffness(F);
     }
-    for (int k = 0; k < 81; ++k) C.c[k / 9][k % 9].store_unaligned(stiffness + k * kLanes + lane);
+    for (int k = 0; k < 81; ++k) C(k / 9, k % 9).store_unaligned(stiffness + k * kLanes + lane);
   }
 }
 

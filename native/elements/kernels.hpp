@@ -23,7 +23,7 @@ struct MaterialKernels {
   const char* name;
   int parameter_count;
   double (*value)(const ChunkData&, const double* x, double* scratch);
-  // slot_gradient: (slots, 3), overwritten
+  // slot_gradient: (slots, kStride), aligned to 32 bytes, overwritten
   double (*value_gradient)(const ChunkData&, const double* x, double* scratch, double* slot_gradient);
   // slot_blocks: (block_slots, 3, 3), overwritten
   void (*hessian)(const ChunkData&, const double* x, bool project, double* scratch, double* slot_blocks);

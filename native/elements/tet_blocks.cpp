@@ -9,8 +9,7 @@
 namespace qlb {
 namespace {
 
-constexpr std::int64_t kChunkPacks =
-    64;  // 512 elements: sums stay in L1/L2, and small meshes still feed every core
+constexpr std::int64_t kChunkPacks = 64;  // 512 elements: sums stay in L1/L2, and small meshes still feed every core
 
 std::uint64_t spread_bits(std::uint64_t v) {  // 21 bits to every third bit
   v &= 0x1fffff;
@@ -73,8 +72,7 @@ SlotLists invert(const std::vector<std::int32_t>& target, std::int64_t targets) 
   for (std::int64_t t = 0; t < targets; ++t) lists.begin[t + 1] += lists.begin[t];
   lists.slot.resize(target.size());
   std::vector<std::int64_t> next(lists.begin.begin(), lists.begin.end() - 1);
-  for (std::size_t s = 0; s < target.size(); ++s)
-    lists.slot[next[target[s]]++] = static_cast<std::int32_t>(s);
+  for (std::size_t s = 0; s < target.size(); ++s) lists.slot[next[target[s]]++] = static_cast<std::int32_t>(s);
   return lists;
 }
 
@@ -85,8 +83,7 @@ std::int64_t localise(std::span<Index> ids, std::vector<std::int32_t>& all) {
   std::vector<Index> unique(ids.begin(), ids.end());
   std::sort(unique.begin(), unique.end());
   unique.erase(std::unique(unique.begin(), unique.end()), unique.end());
-  for (Index& id : ids)
-    id = static_cast<Index>(std::lower_bound(unique.begin(), unique.end(), id) - unique.begin());
+  for (Index& id : ids) id = static_cast<Index>(std::lower_bound(unique.begin(), unique.end(), id) - unique.begin());
   all.insert(all.end(), unique.begin(), unique.end());
   return static_cast<std::int64_t>(unique.size());
 }
@@ -133,8 +130,7 @@ TetBlocks::TetBlocks(std::span<const double> rest_positions, std::span<const std
     chunk.first_block_slot = static_cast<std::int64_t>(slot_block.size());
     const auto count = static_cast<std::size_t>(chunk.packs) * kLanes;
     chunk.slots = localise(std::span(vertex).subspan(first * 4 * kLanes, 4 * count), slot_node);
-    chunk.block_slots =
-        localise(std::span(pair).subspan(first * kPairs * kLanes, kPairs * count), slot_block);
+    chunk.block_slots = localise(std::span(pair).subspan(first * kPairs * kLanes, kPairs * count), slot_block);
     chunks.push_back(chunk);
   }
   node_slots = invert(slot_node, nodes);

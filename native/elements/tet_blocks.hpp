@@ -32,15 +32,14 @@ struct Chunk {
 struct TetBlocks {
   // positions (nodes, 3), tets (elements, 4). The rest volume must not be zero; orientation does not matter
   // here.
-  TetBlocks(std::span<const double> rest_positions, std::span<const std::int32_t> tets,
-            const BlockPattern& pattern);
+  TetBlocks(std::span<const double> rest_positions, std::span<const std::int32_t> tets, const BlockPattern& pattern);
 
   std::int64_t nodes = 0, elements = 0;
   std::vector<Chunk> chunks;
-  Aligned<std::int64_t> vertex;  // (packs, 4, kLanes): slot within the chunk
-  Aligned<std::int32_t> pair;    // (packs, kPairs, kLanes): block slot within the chunk
-  Aligned<double> shape;         // (packs, 9, kLanes): inverse of the rest edge matrix Dm, row by row [1/m]
-  Aligned<double> volume;        // (packs, kLanes): rest volume [m^3]
+  Aligned<std::int64_t> vertex;         // (packs, 4, kLanes): slot within the chunk
+  Aligned<std::int32_t> pair;           // (packs, kPairs, kLanes): block slot within the chunk
+  Aligned<double> shape;                // (packs, 9, kLanes): inverse of the rest edge matrix Dm, row by row [1/m]
+  Aligned<double> volume;               // (packs, kLanes): rest volume [m^3]
   std::vector<std::int32_t> source;     // (packs, kLanes): which element of the input stands in this lane
   std::vector<std::int32_t> slot_node;  // global node of each slot
   SlotLists node_slots;                 // over nodes

@@ -63,13 +63,13 @@ struct CholmodCholesky::State {
   void check(const char* what) const {
     if (common.status >= CHOLMOD_OK) return;
     if (common.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
-    throw std::runtime_error(std::string("CHOLMOD failed to ") + what + " (status " +
-                             std::to_string(common.status) + ")");
+    throw std::runtime_error(std::string("CHOLMOD failed to ") + what + " (status " + std::to_string(common.status) +
+                             ")");
   }
 };
 
-CholmodCholesky::CholmodCholesky(std::shared_ptr<const BlockPattern> pattern,
-                                 std::span<const std::uint8_t> fixed, int threads)
+CholmodCholesky::CholmodCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed,
+                                 int threads)
     : pattern_(std::move(pattern)), threads_(threads), state_(std::make_unique<State>()) {
   if (static_cast<std::int64_t>(fixed.size()) != size())
     throw std::invalid_argument("fixed must have one entry per degree of freedom");
@@ -112,9 +112,8 @@ void CholmodCholesky::build_matrix(std::span<const std::uint8_t> fixed) {
   for (std::int64_t j = 0; j < n; ++j) begin[j + 1] += begin[j];
   std::vector<std::pair<std::int64_t, std::int64_t>> entries(begin[n]);  // row, source
   std::vector<std::int64_t> next(begin.begin(), begin.end());
-  for_each_entry([&](std::int64_t row, std::int64_t column, std::int64_t source) {
-    entries[next[column]++] = {row, source};
-  });
+  for_each_entry(
+      [&](std::int64_t row, std::int64_t column, std::int64_t source) { entries[next[column]++] = {row, source}; });
 
   State& s = *state_;
   s.matrix = cholmod_l_allocate_sparse(n, n, begin[n], 1, 1, -1, CHOLMOD_REAL, &s.common);
@@ -124,8 +123,7 @@ void CholmodCholesky::build_matrix(std::span<const std::uint8_t> fixed) {
   entry_.resize(entries.size());
   for (std::int64_t j = 0; j < n; ++j) {
     std::sort(entries.begin() + begin[j], entries.begin() + begin[j + 1]);
-    for (std::int64_t k = begin[j]; k < begin[j + 1]; ++k)
-      rows[k] = entries[k].first, entry_[k] = entries[k].second;
+    for (std::int64_t k = begin[j]; k < begin[j + 1]; ++k) rows[k] = entries[k].first, entry_[k] = entries[k].second;
   }
 }
 
@@ -163,8 +161,7 @@ void CholmodCholesky::apply(const double* b, double* x) {
   for (std::int64_t k = 0; k < n; ++k) right[k] = b[dof_[k]];
   openblas_set_num_threads(blas_threads_);
   const SerialOpenMp serial;
-  cholmod_l_solve2(CHOLMOD_A, s.factor, s.right, nullptr, &s.solution, nullptr, &s.work_y, &s.work_e,
-                   &s.common);
+  cholmod_l_solve2(CHOLMOD_A, s.factor, s.right, nullptr, &s.solution, nullptr, &s.work_y, &s.work_e, &s.common);
   s.check("solve");
   const auto* solution = static_cast<const double*>(s.solution->x);
   for (std::int64_t k = 0; k < n; ++k) x[dof_[k]] = solution[k];

@@ -13,8 +13,7 @@ class CholmodCholesky : public Cholesky {
  public:
   // fixed: (nodes, 3), nonzero where a degree of freedom is held. Throws std::bad_alloc or
   // std::runtime_error.
-  CholmodCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed,
-                  int threads);
+  CholmodCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed, int threads);
   ~CholmodCholesky() override;
   CholmodCholesky(const CholmodCholesky&) = delete;
   CholmodCholesky& operator=(const CholmodCholesky&) = delete;

@@ -6,8 +6,7 @@
 
 namespace qlb {
 
-std::vector<std::int64_t> nested_dissection(const BlockPattern& pattern,
-                                            std::span<const std::uint8_t> fixed) {
+std::vector<std::int64_t> nested_dissection(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
   const std::int64_t nodes = pattern.nodes();
   std::vector<idx_t> rank(nodes, -1), node_of;
   for (std::int64_t i = 0; i < nodes; ++i) {
@@ -36,8 +35,8 @@ std::vector<std::int64_t> nested_dissection(const BlockPattern& pattern,
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_NUMBERING] = 0;
     options[METIS_OPTION_SEED] = 1;
-    if (METIS_NodeND(&count, begin.data(), neighbour.data(), nullptr, options, order.data(),
-                     inverse.data()) != METIS_OK)
+    if (METIS_NodeND(&count, begin.data(), neighbour.data(), nullptr, options, order.data(), inverse.data()) !=
+        METIS_OK)
       throw std::runtime_error("METIS could not order the matrix");
   }
 

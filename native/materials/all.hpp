@@ -13,7 +13,7 @@ namespace qlb {
 template <template <class> class... Materials>
 struct MaterialList {};
 
-using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean,
-                                  FixedCorotational, Arap, MooneyRivlin, LinearElastic>;
+using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean, FixedCorotational, Arap,
+                                  MooneyRivlin, LinearElastic>;
 
 }  // namespace qlb

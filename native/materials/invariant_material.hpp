@@ -53,20 +53,18 @@ struct InvariantMaterial {
     const Invariants<V> I = invariants(F, G);
     const InvariantDerivatives<V> d = self().derivatives(I);
     Stiffness9<V> C;
-    const V ff = V(4.0) * (Self::uses_I2 ? d.d11 + d.d2 : d.d11), fG = V(2.0) * d.d1J,
-            diagonal = V(2.0) * d.d1;
+    const V ff = V(4.0) * (Self::uses_I2 ? d.d11 + d.d2 : d.d11), fG = V(2.0) * d.d1J, diagonal = V(2.0) * d.d1;
     for (int p = 0; p < 9; ++p)
       for (int q = 0; q <= p; ++q) {
         const int i = p / 3, k = p % 3, j = q / 3, l = q % 3;
-        V c =
-            ff * F(i, k) * F(j, l) + fG * (F(i, k) * G(j, l) + G(i, k) * F(j, l)) + d.dJJ * G(i, k) * G(j, l);
+        V c = ff * F(i, k) * F(j, l) + fG * (F(i, k) * G(j, l) + G(i, k) * F(j, l)) + d.dJJ * G(i, k) * G(j, l);
         if (p == q) c += diagonal;
         if (i != j && k != l) {  // d2J / dF_ik dF_jl = e_ijm e_kln F_mn
           const V f = d.dJ * F(3 - i - j, 3 - k - l);
           const bool even = ((j - i + 3) % 3 == 1) == ((l - k + 3) % 3 == 1);
           c = even ? c + f : c - f;
         }
-        C.c[p][q] = C.c[q][p] = c;
+        C(p, q) = c;
       }
     if constexpr (Self::uses_I2) add_second_invariant(F, G, I, d, C);
     return C;
@@ -127,8 +125,7 @@ struct InvariantMaterial {
         if (p == q) c += twice * I.I1;
         if (i == j) c -= twice * right(k, l);
         if (k == l) c -= twice * left(i, j);
-        C.c[p][q] += c;
-        if (p != q) C.c[q][p] += c;
+        C(p, q) += c;
       }
   }
 };

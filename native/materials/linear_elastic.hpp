@@ -33,13 +33,13 @@ struct LinearElastic {
   Stiffness9<V> stiffness(const Mat3<V>&) const {
     Stiffness9<V> C;
     for (int p = 0; p < 9; ++p)
-      for (int q = 0; q < 9; ++q) {
+      for (int q = 0; q <= p; ++q) {
         const int i = p / 3, k = p % 3, j = q / 3, l = q % 3;
         V c(0.0);
         if (i == k && j == l) c += lambda;
         if (i == j && k == l) c += mu;
         if (i == l && k == j) c += mu;
-        C.c[p][q] = c;
+        C(p, q) = c;
       }
     return C;
   }

@@ -27,10 +27,15 @@ enum class HessianForm {
   kConvexStiffness,       // stiffness(F) is positive semidefinite as it stands
 };
 
-// d2psi / dF_ik dF_jl at [3 i + k][3 j + l]; symmetric, filled whole.
+// d2psi / dF_ik dF_jl at (3 i + k, 3 j + l); symmetric, only the lower triangle is kept.
 template <class V>
-struct Stiffness9 {
-  V c[9][9];
+class Stiffness9 {
+ public:
+  V& operator()(int p, int q) { return p >= q ? lower_[p][q] : lower_[q][p]; }
+  const V& operator()(int p, int q) const { return p >= q ? lower_[p][q] : lower_[q][p]; }
+
+ private:
+  V lower_[9][9];
 };
 
 // The Hessian of an isotropic energy in the frame U E_ij R^T of the SVD (Smith, de Goes, Kim 2019, section

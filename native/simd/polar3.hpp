@@ -14,8 +14,7 @@ Mat3<V> nearest_rotation_newton(Mat3<V> X) {
     const Mat3<V> G = cofactor(X);
     const V inverse = V(1.0) / dot(column(X, 0), column(G, 0));
     V a(0.5), b = V(0.5) * inverse;
-    if (k ==
-        0) {  // brings the singular values around 1; later the iteration converges quadratically by itself
+    if (k == 0) {  // brings the singular values around 1; later the iteration converges quadratically by itself
       const V gamma = xsimd::sqrt(xsimd::sqrt(contract(G, G) * inverse * inverse / contract(X, X)));
       a *= gamma;
       b = b / gamma;
