@@ -20,7 +20,7 @@ class InverseOperator {
 class Cholesky : public InverseOperator {
  public:
   static constexpr std::int64_t kPositiveDefinite = -1;
-  // Returns kPositiveDefinite, or the degree of freedom (3 node + axis) whose pivot is not positive.
+  // Returns kPositiveDefinite, or the degree of freedom (3 node + axis) whose pivot is not positive or not a number.
   virtual std::int64_t factorise(const BlockMatrix& matrix) = 0;
   virtual std::int64_t factor_nonzeros() const = 0;
   virtual double factor_flops() const = 0;

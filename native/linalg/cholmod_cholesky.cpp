@@ -5,6 +5,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -127,6 +128,16 @@ void CholmodCholesky::build_matrix(std::span<const std::uint8_t> fixed) {
   }
 }
 
+// The first column with an entry that is not a number, which LAPACK would let pass; -1 if there is none.
+std::int64_t CholmodCholesky::first_not_finite() const {
+  const auto* values = static_cast<const double*>(state_->matrix->x);
+  const auto* begin = static_cast<const SuiteSparse_long*>(state_->matrix->p);
+  for (std::size_t column = 0; column < dof_.size(); ++column)
+    for (SuiteSparse_long k = begin[column]; k < begin[column + 1]; ++k)
+      if (!std::isfinite(values[k])) return static_cast<std::int64_t>(column);
+  return -1;
+}
+
 std::int64_t CholmodCholesky::factorise(const BlockMatrix& matrix) {
   if (&matrix.pattern() != pattern_.get())
     throw std::invalid_argument("the matrix has another pattern than the factor");
@@ -137,11 +148,12 @@ std::int64_t CholmodCholesky::factorise(const BlockMatrix& matrix) {
   const auto count = static_cast<std::int64_t>(entry_.size());
 #pragma omp parallel for schedule(static) num_threads(threads_)
   for (std::int64_t k = 0; k < count; ++k) values[k] = matrix.values()[entry_[k]];
+  ready_ = false;
+  if (const std::int64_t column = first_not_finite(); column >= 0) return dof_[column];
 
   openblas_set_num_threads(blas_threads_);
   const SerialOpenMp serial;
   cholmod_l_factorize(s.matrix, s.factor, &s.common);
-  ready_ = false;
   s.check("factorise the matrix");
   if (s.factor->minor < s.factor->n) {
     const auto* postorder = static_cast<SuiteSparse_long*>(s.factor->Perm);

@@ -26,6 +26,7 @@ class CholmodCholesky : public Cholesky {
 
  private:
   struct State;  // CHOLMOD's own types stay out of this header
+  std::int64_t first_not_finite() const;
   void build_matrix(std::span<const std::uint8_t> fixed);
 
   std::shared_ptr<const BlockPattern> pattern_;

@@ -11,26 +11,26 @@ Lbfgs::Lbfgs(std::int64_t size, int window, int threads)
     : size_(size),
       window_(std::max(window, 1)),
       threads_(threads),
-      pairs_(2 * static_cast<std::size_t>(window_) * size),
-      curvature_(window_),
+      pairs_(2 * static_cast<std::size_t>(window_ + 1) * size),
+      curvature_(window_ + 1),
       alpha_(window_),
       work_(size) {}
 
 bool Lbfgs::push(const double* x_old, const double* x, const double* g_old, const double* g) {
-  const bool full = count_ == window_;
-  if (full) first_ = (first_ + 1) % window_;
-  const int last = full ? count_ - 1 : count_;
-  double *s_new = s(last), *y_new = y(last);
+  double *s_new = s(count_), *y_new = y(count_);
   for (std::int64_t k = 0; k < size_; ++k) {
     s_new[k] = x[k] - x_old[k];
     y_new[k] = g[k] - g_old[k];
   }
   const double sy = dot(s_new, y_new, size_, threads_);
   const double ss = dot(s_new, s_new, size_, threads_), yy = dot(y_new, y_new, size_, threads_);
-  const bool keep = sy > 1e-12 * std::sqrt(ss * yy);
-  count_ = keep ? last + 1 : last;
-  if (keep) curvature_[slot(last)] = sy;
-  return keep;
+  if (!(sy > 1e-12 * std::sqrt(ss * yy))) return false;
+  curvature_[slot(count_)] = sy;
+  if (count_ == window_)
+    first_ = (first_ + 1) % (window_ + 1);
+  else
+    ++count_;
+  return true;
 }
 
 double Lbfgs::direction(const double* g, InverseOperator& inner, double* p) {

@@ -26,12 +26,13 @@ class Lbfgs {
  private:
   double* s(int k) { return pairs_.data() + (2 * slot(k)) * size_; }
   double* y(int k) { return pairs_.data() + (2 * slot(k) + 1) * size_; }
-  std::int64_t slot(int k) const { return (first_ + k) % window_; }  // k = 0 is the oldest
+  // k = 0 is the oldest pair; one slot more than the window, where a new pair waits to be judged.
+  std::int64_t slot(int k) const { return (first_ + k) % (window_ + 1); }
 
   std::int64_t size_;
   int window_, threads_;
   int first_ = 0, count_ = 0;
-  Aligned<double> pairs_;  // (window, 2, size)
+  Aligned<double> pairs_;  // (window + 1, 2, size)
   std::vector<double> curvature_, alpha_;
   Aligned<double> work_;
 };

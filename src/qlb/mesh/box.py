@@ -22,7 +22,7 @@ def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> T
     """
     if len(size) != 3 or not all(np.isfinite(s) and s > 0 for s in size):
         raise InputError(f"box size {tuple(size)} is out of range: three lengths > 0 m")
-    if len(cells) != 3 or not all(int(c) == c and c >= 1 for c in cells):
+    if len(cells) != 3 or not all(np.isfinite(c) and int(c) == c and c >= 1 for c in cells):
         raise InputError(f"box cells {tuple(cells)} are out of range: three whole numbers >= 1")
 
     counts = [int(c) for c in cells]

@@ -16,9 +16,11 @@ def read_tet_mesh(path: Path) -> TetMesh:
 
     if not path.is_file():
         raise InputError(f"mesh file {path} does not exist")
+    if path.stat().st_size == 0:
+        raise InputError(f"mesh file {path} is empty")
     try:
         data = meshio.read(path)
-    except (meshio.ReadError, SystemExit, ValueError, KeyError, IndexError, OSError, AssertionError) as error:
+    except (Exception, SystemExit) as error:  # its readers raise whatever they stumble over
         reason = str(error).strip().splitlines()
         raise InputError(f"mesh file {path} cannot be read: {reason[0] if reason else type(error).__name__}") from None
     cells = [block.data for block in data.cells if block.type == "tetra"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +29,7 @@ class TetMesh:
     """
 
     def __init__(self, positions: npt.ArrayLike, tets: npt.ArrayLike) -> None:
-        x = np.ascontiguousarray(positions, dtype=np.float64)
-        t = np.asarray(tets)
+        x, t = _array("positions", positions, np.float64), _array("tets", tets)
         if x.ndim != 2 or x.shape[1] != 3:
             raise InputError(f"positions have shape {x.shape}, must be (n, 3)")
         if t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
@@ -38,7 +38,7 @@ class TetMesh:
             raise InputError(f"tets have type {t.dtype}, must be integers")
         _check_indices(t, len(x))
         self.positions: FloatArray = x
-        self.tets: IntArray = np.ascontiguousarray(t, dtype=np.int32)
+        self.tets: IntArray = t.astype(np.int32, order="C")
         _check_geometry(self)
         self.positions.setflags(write=False)
         self.tets.setflags(write=False)
@@ -84,6 +84,14 @@ class TetMesh:
         corners = self.positions[self.tets]
         a, b = np.triu_indices(4, k=1)
         return np.asarray(np.linalg.norm(corners[:, a] - corners[:, b], axis=2), dtype=np.float64)
+
+
+def _array(name: str, values: npt.ArrayLike, dtype: npt.DTypeLike | None = None) -> npt.NDArray[Any]:
+    """A C-ordered copy."""
+    try:
+        return np.array(values, dtype=dtype, order="C")
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are not an array of numbers: {' '.join(str(error).split())}") from None
 
 
 def signed_volumes(positions: FloatArray, tets: IntArray) -> FloatArray:

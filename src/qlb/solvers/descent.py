@@ -51,40 +51,35 @@ class Descent(ABC):
 
     def minimise(self, problem: StageProblem) -> SolveResult:
         """Minimise the stage's E from the initial guess until the tolerance is met or the solve fails."""
-        point = self._initial_point(problem)
-        reference = point.residual
-        if point.x is not problem.start:
+        log = _Log(problem, self.factor)
+        log.add(self._initial_point(problem), 0.0)
+        reference = log.point.residual
+        if log.point.x is not problem.start:
             reference = problem.residual(problem.value_gradient(problem.start)[1])
-        rows: list[IterationRow] = []
-        tried = self.factor.count
+        try:
+            reason = self._descend(problem, log, reference)
+        except FloatingPointError:  # a Hessian that is not finite
+            reason = Reason.NOT_FINITE
+        return SolveResult(log.point.x, reason, log.point.residual, reference, log.rows)
 
-        def record(point: Point, step_length: float) -> None:
-            nonlocal tried
-            made, tried = self.factor.count - tried, self.factor.count
-            rows.append(IterationRow(len(rows), point.residual, point.energy, step_length, made, problem.timer.lap()))
-
-        def end(reason: Reason) -> SolveResult:
-            return SolveResult(point.x, reason, point.residual, reference, rows)
-
-        record(point, 0.0)
-        if not point.is_finite:
-            return end(Reason.NOT_FINITE)
-        reason = self._converged(problem, point, reference)
+    def _descend(self, problem: StageProblem, log: _Log, reference: float) -> Reason:
+        if not log.point.is_finite:
+            return Reason.NOT_FINITE
+        reason = self._converged(problem, log.point, reference)
         if reason is None:
             self.begin_solve(problem)
         while reason is None:
-            found = self._search(problem, point)
+            if len(log.rows) > self.settings.max_iterations:
+                return Reason.MAX_ITERATIONS
+            old, found = log.point, self._search(problem, log.point)
             if found is None:
-                record(point, 0.0)
-                return end(Reason.LINE_SEARCH_FAILED)
+                log.add(old, 0.0)
+                return Reason.LINE_SEARCH_FAILED
             step_length, new = found
-            self.accept(point, new)
-            point = new
-            record(point, step_length)
-            reason = self._converged(problem, point, reference)
-            if reason is None and len(rows) > self.settings.max_iterations:
-                reason = Reason.MAX_ITERATIONS
-        return end(reason)
+            self.accept(old, new)
+            log.add(new, step_length)
+            reason = self._converged(problem, new, reference)
+        return reason
 
     def _initial_point(self, problem: StageProblem) -> Point:
         """x_k, or the predictor where it is asked for and its energy is finite."""
@@ -111,3 +106,18 @@ class Descent(ABC):
         if point.residual <= max(tolerance.absolute, tolerance.scaled * problem.residual_scale):
             return Reason.CONVERGED_ABSOLUTE
         return None
+
+
+class _Log:
+    """The point at hand, and a row for each iteration that led there."""
+
+    def __init__(self, problem: StageProblem, factor: Factor) -> None:
+        self.rows: list[IterationRow] = []
+        self.point: Point
+        self._timer, self._factor, self._tried = problem.timer, factor, factor.count
+
+    def add(self, point: Point, step_length: float) -> None:
+        made, self._tried = self._factor.count - self._tried, self._factor.count
+        row = IterationRow(len(self.rows), point.residual, point.energy, step_length, made, self._timer.lap())
+        self.rows.append(row)
+        self.point = point

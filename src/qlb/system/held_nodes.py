@@ -36,6 +36,10 @@ class Rotation:
     start: float = 0.0
     stop: float = np.inf
 
+    def __post_init__(self) -> None:
+        if not np.linalg.norm(self.axis) > 0:
+            raise InputError(f"rotation axis {self.axis} has no length: must be a direction")
+
     def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
         """Positions [m] at `time` [s], by Rodrigues' formula."""
         angle = 2 * np.pi * self.rate * max(0.0, min(time, self.stop) - self.start)
@@ -69,14 +73,18 @@ class HeldNodes:
         Raises:
             InputError: no nodes, an index out of range, a node held already, an axis that is not x, y or z.
         """
-        indices = np.unique(np.asarray(nodes, dtype=np.int32))
-        if len(indices) == 0:
+        selection = np.asarray(nodes)
+        if selection.size == 0:
             raise InputError("no nodes to hold: the selection is empty")
+        if not np.issubdtype(selection.dtype, np.integer):
+            raise InputError(f"nodes to hold have type {selection.dtype}, must be integers: node indices")
+        indices = np.unique(selection)
         if indices[0] < 0 or indices[-1] >= len(self.fixed):
             bad = indices[0] if indices[0] < 0 else indices[-1]
             raise InputError(f"held node {bad} is out of range: must be in [0, {len(self.fixed) - 1}]")
         if not axes or not set(axes) <= set("xyz"):
             raise InputError(f"axes {axes!r} must be letters out of x, y, z")
+        indices = indices.astype(np.int32)
         columns = np.array(sorted({"xyz".index(axis) for axis in axes}), dtype=np.int32)
         held = self.fixed[np.ix_(indices, columns)].any(axis=1)
         if held.any():
