@@ -7,7 +7,7 @@ from importlib.metadata import version as _version
 # before the OpenMP runtime is loaded; a value that the user has set wins.
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from qlb.errors import InputError, QlbError, StepFailed
+from qlb.errors import InputError, QlbError
 from qlb.integrators import State
 from qlb.materials import (
     Arap,
@@ -19,7 +19,7 @@ from qlb.materials import (
     StVenantKirchhoff,
 )
 from qlb.mesh import TetMesh
-from qlb.simulation import Simulation, StepResult
+from qlb.simulation import Simulation, StepFailed, StepResult
 from qlb.solvers import Reason, SolverSettings, Tolerance
 from qlb.system import Rotation, Translation
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from qlb.arrays import FloatArray, vector
-from qlb.errors import InputError, StepFailed
+from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS, Integrator, State
 from qlb.materials.material import Material
 from qlb.mesh.tet_mesh import TetMesh
@@ -62,6 +62,18 @@ class StepResult:
     def factorizations(self) -> int:
         """Cholesky factorisations of all solves."""
         return sum(solve.factorizations for solve in self.solves)
+
+
+class StepFailed(QlbError, RuntimeError):
+    """A time step did not converge.
+
+    Attributes:
+        result: the failed step; its state was not taken over by the simulation.
+    """
+
+    def __init__(self, message: str, result: StepResult) -> None:
+        super().__init__(message)
+        self.result = result
 
 
 class Simulation:

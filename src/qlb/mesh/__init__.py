@@ -1,6 +1,5 @@
-"""Tetrahedral meshes: the type with its checks, and generators."""
+"""Tetrahedral meshes: the type with its checks, and where they come from."""
 
-from qlb.mesh.box import box_mesh
 from qlb.mesh.tet_mesh import TetMesh
 
-__all__ = ["TetMesh", "box_mesh"]
+__all__ = ["TetMesh"]

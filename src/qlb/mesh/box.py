@@ -6,12 +6,13 @@ from itertools import permutations
 
 import numpy as np
 
+from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
-from qlb.mesh.tet_mesh import TetMesh, signed_volumes
+from qlb.mesh.geometry import signed_volumes
 
 
-def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> TetMesh:
-    """A box from the origin to `size` [m] with `cells` cells along each axis.
+def kuhn_box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[FloatArray, IntArray]:
+    """Positions [m] (n, 3) and tets (m, 4) of a box from the origin to `size` [m], `cells` cells along each axis.
 
     Each cell is cut into the six Kuhn tetrahedra (Kuhn 1960), one for each order of the axes in which a path along
     edges can climb from a corner to the opposite one. Neighbouring cells are mirror images, which makes the mesh
@@ -39,7 +40,11 @@ def box_mesh(size: tuple[float, float, float], cells: tuple[int, int, int]) -> T
         np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(order)]]), axis=0)
         for order in permutations(range(3))
     ]
-    tets = np.stack([np.stack([corner(offset) for offset in path], axis=-1) for path in paths], axis=1).reshape(-1, 4)
-    negative = signed_volumes(positions, tets.astype(np.int32)) < 0
+    tets = (
+        np.stack([np.stack([corner(offset) for offset in path], axis=-1) for path in paths], axis=1)
+        .reshape(-1, 4)
+        .astype(np.int32)
+    )
+    negative = signed_volumes(positions, tets) < 0
     tets[negative, 2:] = tets[negative, :1:-1]
-    return TetMesh(positions, tets)
+    return positions, tets

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
-from qlb.mesh.tet_mesh import TetMesh
 
 
-def read_tet_mesh(path: Path) -> TetMesh:
-    """The tetrahedra of a mesh file; see `TetMesh.read`."""
+def read_tets(path: Path) -> tuple[FloatArray, IntArray]:
+    """Positions [m] (n, 3) and tets (m, 4) of a mesh file, without unused nodes; see `TetMesh.read`."""
     import meshio
 
     if not path.is_file():
@@ -32,4 +32,4 @@ def read_tet_mesh(path: Path) -> TetMesh:
     if used[0] < 0 or used[-1] >= len(data.points):
         bad = used[-1] if used[0] >= 0 else used[0]
         raise InputError(f"mesh file {path}: node index {bad} is outside its {len(data.points)} nodes")
-    return TetMesh(np.asarray(data.points, dtype=np.float64)[used, :3], renumbered.reshape(-1, 4))
+    return np.asarray(data.points, dtype=np.float64)[used, :3], renumbered.reshape(-1, 4).astype(np.int32)

@@ -11,6 +11,9 @@ import numpy.typing as npt
 
 from qlb.arrays import BoolArray, FloatArray, IntArray
 from qlb.errors import InputError
+from qlb.mesh.box import kuhn_box
+from qlb.mesh.files import read_tets
+from qlb.mesh.geometry import signed_volumes
 
 # A tet counts as flat when its volume is below this fraction of its longest edge cubed (a regular one has 0.118).
 FLAT = 1e-10
@@ -48,9 +51,7 @@ class TetMesh:
         size: tuple[float, float, float] = (1.0, 0.25, 0.25), *, cells: tuple[int, int, int] = (20, 5, 5)
     ) -> TetMesh:
         """A box from the origin to `size` [m], cut in cells of 6 Kuhn tets, mirrored from cell to cell."""
-        from qlb.mesh.box import box_mesh
-
-        return box_mesh(size, cells)
+        return TetMesh(*kuhn_box(size, cells))
 
     @staticmethod
     def read(path: str | Path) -> TetMesh:
@@ -61,9 +62,7 @@ class TetMesh:
         Raises:
             InputError: the file is missing, unreadable, has no tetrahedra, or fails the checks of `TetMesh`.
         """
-        from qlb.mesh.files import read_tet_mesh
-
-        return read_tet_mesh(Path(path))
+        return TetMesh(*read_tets(Path(path)))
 
     def nodes_where(self, condition: Callable[[FloatArray], BoolArray]) -> IntArray:
         """Indices of the nodes whose rest positions meet `condition`: (n, 3) positions [m] -> (n,) booleans."""
@@ -92,13 +91,6 @@ def _array(name: str, values: npt.ArrayLike, dtype: npt.DTypeLike | None = None)
         return np.array(values, dtype=dtype, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} are not an array of numbers: {' '.join(str(error).split())}") from None
-
-
-def signed_volumes(positions: FloatArray, tets: IntArray) -> FloatArray:
-    """det(x1 - x0, x2 - x0, x3 - x0) / 6 of each tet [m^3], shape (m,)."""
-    corners = positions[tets]
-    edges = corners[:, 1:] - corners[:, :1]
-    return np.asarray(np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0)
 
 
 def _check_indices(tets: npt.NDArray[np.integer], nodes: int) -> None:

@@ -15,14 +15,14 @@ import numpy as np
 import yaml
 
 from qlb import _native
-from qlb.errors import InputError, StepFailed
+from qlb.errors import InputError
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
 from qlb.results.clock import LoopClock
 from qlb.results.errors import WriteError
 from qlb.results.files import append_text, write_arrays, write_text
 from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
-from qlb.simulation import Simulation, StepResult
+from qlb.simulation import Simulation, StepFailed, StepResult
 
 Status = Literal["running", "complete", "failed", "interrupted"]
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from qlb.errors import StepFailed
 from qlb.results import Run, RunWriter
 from qlb.scenes import Scene
-from qlb.simulation import StepResult
+from qlb.simulation import StepFailed, StepResult
 
 
 @dataclass(frozen=True)
