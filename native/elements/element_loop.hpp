@@ -116,16 +116,6 @@ void contract_stiffness(const Stiffness9<V>& C, const Tets<V>& tets, Mat3<V> (&H
   }
 }
 
-template <class M>
-inline constexpr bool has_spectrum = M::hessian_form != HessianForm::kConvexStiffness;
-template <class M>
-inline constexpr bool has_stiffness = M::hessian_form != HessianForm::kSpectrum;
-
-template <class M>
-constexpr bool uses_spectrum(bool project) {
-  return M::hessian_form == HessianForm::kSpectrum || (project && has_spectrum<M>);
-}
-
 template <class V>
 Spectrum<V> project_psd(Spectrum<V> H) {
   H.scaling = project_psd(H.scaling);
@@ -134,6 +124,25 @@ Spectrum<V> project_psd(Spectrum<V> H) {
     H.flip[k] = xsimd::max(H.flip[k], V(0.0));
   }
   return H;
+}
+
+// Calls with_spectrum(spectrum, svd) or with_stiffness(C), whichever form of the Hessian the material has for this.
+template <class V, class M, class Stiff, class Spectral>
+void visit_hessian(const M& material, const Mat3<V>& F, bool project, const Stiff& with_stiffness,
+                   const Spectral& with_spectrum) {
+  constexpr HessianForm form = M::hessian_form;
+  constexpr bool has_spectrum = form == HessianForm::kSpectrum || form == HessianForm::kStiffnessAndSpectrum;
+  if constexpr (has_spectrum) {
+    if (project || form == HessianForm::kSpectrum) {
+      const Svd3<V> svd = svd3(F);
+      const Spectrum<V> spectrum = material.spectrum(svd.sigma);
+      return with_spectrum(project ? project_psd(spectrum) : spectrum, svd);
+    }
+  }
+  if constexpr (form == HessianForm::kStiffnessPair) {
+    if (project) return with_stiffness(material.projected_stiffness(F));
+  }
+  if constexpr (form != HessianForm::kSpectrum) with_stiffness(material.stiffness(F));
 }
 
 // The same blocks from a spectrum: contract in the frame of the SVD, where C is sparse, and turn each block
@@ -199,15 +208,9 @@ void chunk_hessian(const ChunkData& chunk, const double* x, bool project, double
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
     const Mat3<V> F = tets.deformation_gradient(positions);
     Mat3<V> H[3][3];
-    if (uses_spectrum<M<V>>(project)) {
-      if constexpr (has_spectrum<M<V>>) {
-        const Svd3<V> svd = svd3(F);
-        const Spectrum<V> spectrum = material.spectrum(svd.sigma);
-        contract_spectrum(project ? project_psd(spectrum) : spectrum, svd, tets, H);
-      }
-    } else if constexpr (has_stiffness<M<V>>) {
-      contract_stiffness(material.stiffness(F), tets, H);
-    }
+    visit_hessian<V>(
+        material, F, project, [&](const Stiffness9<V>& C) { contract_stiffness(C, tets, H); },
+        [&](const Spectrum<V>& S, const Svd3<V>& svd) { contract_spectrum(S, svd, tets, H); });
     scatter_blocks(tets, H, slot_blocks);
   });
 }
@@ -248,15 +251,9 @@ void lanes_density(const double* F_lanes, const double* parameter_lanes, bool pr
     material.energy_stress(F, P).store_unaligned(energy + lane);
     for (int k = 0; k < 9; ++k) P(k / 3, k % 3).store_unaligned(stress + k * kLanes + lane);
     Stiffness9<V> C;
-    if (uses_spectrum<M<V>>(project)) {
-      if constexpr (has_spectrum<M<V>>) {
-        const Svd3<V> svd = svd3(F);
-        const Spectrum<V> spectrum = material.spectrum(svd.sigma);
-        C = expand_spectrum(project ? project_psd(spectrum) : spectrum, svd);
-      }
-    } else if constexpr (has_stiffness<M<V>>) {
-      C = material.stiffness(F);
-    }
+    visit_hessian<V>(
+        material, F, project, [&](const Stiffness9<V>& exact) { C = exact; },
+        [&](const Spectrum<V>& S, const Svd3<V>& svd) { C = expand_spectrum(S, svd); });
     for (int k = 0; k < 81; ++k) C(k / 9, k % 9).store_unaligned(stiffness + k * kLanes + lane);
   }
 }

@@ -3,6 +3,7 @@
 
 #include "materials/compressible_neo_hookean.hpp"
 #include "materials/corotational.hpp"
+#include "materials/fibres.hpp"
 #include "materials/linear_elastic.hpp"
 #include "materials/mooney_rivlin.hpp"
 #include "materials/st_venant_kirchhoff.hpp"
@@ -14,6 +15,6 @@ template <template <class> class... Materials>
 struct MaterialList {};
 
 using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean, FixedCorotational, Arap,
-                                  MooneyRivlin, LinearElastic>;
+                                  MooneyRivlin, LinearElastic, FibreSqrtI5, FibreStVK>;
 
 }  // namespace qlb

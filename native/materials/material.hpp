@@ -24,6 +24,7 @@ namespace qlb {
 enum class HessianForm {
   kStiffnessAndSpectrum,  // exact Hessians from stiffness(F), projected ones from spectrum(sigma)
   kSpectrum,              // both from spectrum(sigma)
+  kStiffnessPair,         // exact from stiffness(F), projected from projected_stiffness(F)
   kConvexStiffness,       // stiffness(F) is positive semidefinite as it stands
 };
 

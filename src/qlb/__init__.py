@@ -12,6 +12,7 @@ from qlb.integrators import State
 from qlb.materials import (
     Arap,
     CompressibleNeoHookean,
+    Fibres,
     FixedCorotational,
     LinearElastic,
     MooneyRivlin,
@@ -28,6 +29,7 @@ __version__ = _version("qlb")
 __all__ = [
     "Arap",
     "CompressibleNeoHookean",
+    "Fibres",
     "FixedCorotational",
     "InputError",
     "LinearElastic",

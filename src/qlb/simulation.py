@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from qlb.arrays import FloatArray, vector
 from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS, Integrator, State
-from qlb.materials.material import Material
+from qlb.materials import Fibres, Material
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
 from qlb.system import HeldNodes, Motion, StageProblem, System
@@ -82,6 +82,7 @@ class Simulation:
     Args:
         mesh: the body at rest; it starts there.
         material: a hyperelastic material.
+        fibres: families of fibres that are added to it.
         integrator: "BDF1", "BDF2", "SDIRK2" or "quasistatic".
         solver: "ND", "QLF" or "QLB".
         step: h [s], > 0.
@@ -105,6 +106,7 @@ class Simulation:
         mesh: TetMesh,
         *,
         material: Material,
+        fibres: Sequence[Fibres] = (),
         integrator: str = "BDF2",
         solver: str = "QLB",
         step: float = 1e-2,
@@ -126,6 +128,7 @@ class Simulation:
         _require("threads", threads, ">= 1", threads is None or threads >= 1)
         self.mesh = mesh
         self.material = material
+        self.fibres = tuple(fibres)
         self.step = float(step)
         self.gravity = gravity
         self.mass: MassKind = mass
@@ -180,6 +183,7 @@ class Simulation:
             self._system = System(
                 self.mesh,
                 self.material,
+                fibres=self.fibres,
                 gravity=self.gravity,
                 mass=self.mass,
                 mass_damping=self.mass_damping,

@@ -6,6 +6,7 @@ from pydantic import Discriminator, Tag
 
 from qlb.materials.compressible_neo_hookean import CompressibleNeoHookean
 from qlb.materials.corotational import Arap, FixedCorotational
+from qlb.materials.fibres import Fibres
 from qlb.materials.linear_elastic import LinearElastic
 from qlb.materials.material import IsotropicMaterial, Material
 from qlb.materials.mooney_rivlin import MooneyRivlin
@@ -40,6 +41,7 @@ __all__ = [
     "AnyMaterial",
     "Arap",
     "CompressibleNeoHookean",
+    "Fibres",
     "FixedCorotational",
     "IsotropicMaterial",
     "LinearElastic",

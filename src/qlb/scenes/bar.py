@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from qlb.materials import Fibres
 from qlb.mesh import TetMesh
 from qlb.scenes.scene import Scene, Vector
 from qlb.settings import Settings, quantity
@@ -33,6 +35,8 @@ class BarScene(Scene):
 
     scene: Literal["bar"] = "bar"
     variant: Literal["drop", "twist"] = Field("drop", description="drop: one end held; twist: both, the far one turns")
+    heterogeneous: bool = Field(False, description="Eight slabs along the bar, every other one ten times stiffer")
+    anisotropic: bool = Field(False, description="Fibres along (1, 1, 0) with twice Young's modulus, unless given")
     mesh: BoxMeshSettings = BoxMeshSettings()
     twist: TwistSettings = TwistSettings()
 
@@ -45,10 +49,22 @@ class BarScene(Scene):
         )
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         near = 1e-6 * (high[0] - low[0])
-        simulation = Simulation(mesh, **self.simulation_arguments())
+        simulation = Simulation(mesh, **self.simulation_arguments() | self._composition(mesh))
         simulation.pin(mesh.nodes_where(lambda x: x[:, 0] <= low[0] + near))
         if self.variant == "twist":
             centre = 0.5 * (low + high)
             axis = Rotation(axis=(1.0, 0.0, 0.0), origin=tuple(centre), rate=self.twist.rate)
             simulation.move(mesh.nodes_where(lambda x: x[:, 0] >= high[0] - near), axis)
         return simulation
+
+    def _composition(self, mesh: TetMesh) -> dict[str, Any]:
+        """Material and fibres, for the variants of the paper's figures 3 and 4 (the numbers are ours)."""
+        arguments: dict[str, Any] = {}
+        if self.heterogeneous:
+            x = mesh.positions[mesh.tets].mean(axis=1)[:, 0]
+            slab = np.floor(8 * (x - mesh.positions[:, 0].min()) / np.ptp(mesh.positions[:, 0]))
+            young = np.where(slab % 2 == 1, 10.0, 1.0) * self.material.young
+            arguments["material"] = self.material.model_copy(update={"young": young})
+        if self.anisotropic and self.fibres is None:
+            arguments["fibres"] = (Fibres(modulus=2 * self.material.young, direction=(1.0, 1.0, 0.0)),)
+        return arguments

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from qlb.integrators import INTEGRATORS
-from qlb.materials import AnyMaterial, StableNeoHookean
+from qlb.materials import AnyMaterial, Fibres, StableNeoHookean
 from qlb.settings import Settings, choice, quantity
 from qlb.simulation import OnFailure, Simulation
 from qlb.solvers import SOLVERS, SolverSettings, Tolerance
@@ -46,6 +46,7 @@ class Scene(Settings):
     """Settings common to all scenes; a subclass adds its own and builds the simulation."""
 
     material: AnyMaterial = Field(StableNeoHookean(), description="What the body is made of")
+    fibres: Fibres | None = Field(None, description="Fibres that are added to the material")
     mass: MassKind = Field("lumped", description="lumped or consistent mass matrix")
     damping: DampingSettings = DampingSettings()
     loads: LoadSettings = LoadSettings()
@@ -79,6 +80,7 @@ class Scene(Settings):
         """The keyword arguments of `Simulation` that every scene passes on."""
         return {
             "material": self.material,
+            "fibres": () if self.fibres is None else (self.fibres,),
             "integrator": self.integrator,
             "solver": self.solver,
             "step": self.step,

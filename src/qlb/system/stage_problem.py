@@ -46,7 +46,8 @@ class StageProblem:
         system, gradient = self.system, -self._load
         with self.timer.section("gradient"):
             energy = self._load_at_rest - system.dot(self._load, x)
-            energy += system.elastic.add_value_gradient(x, self.force_scale, gradient)
+            for potential in system.potentials:
+                energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
         return energy, system.clear_held(gradient)
@@ -61,7 +62,8 @@ class StageProblem:
             if self._hessian is None:
                 self._hessian = _native.BlockMatrix(system.pattern)
             self._hessian.set_zero(system.threads)
-            system.elastic.add_hessian(x, self.force_scale, project, self._hessian)
+            for potential in system.potentials:
+                potential.add_hessian(x, self.force_scale, project, self._hessian)
             if self.stage.inertial:
                 system.inertia.add_hessian(self._mass_scale, self._hessian)
             return self._hessian

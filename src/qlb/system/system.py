@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from qlb import _native
 from qlb.arrays import FloatArray, IntArray, LongArray, vector
 from qlb.errors import InputError
+from qlb.materials.fibres import Fibres
 from qlb.materials.material import Material, per_element
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.system.held_nodes import HeldNodes
@@ -23,7 +24,8 @@ class System:
     """Mesh, material, mass, loads and held nodes, with the compiled energies over them.
 
     Attributes:
-        elastic: the elastic energy [J].
+        elastic: the elastic energy of the material [J].
+        potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
         inertia: 1/2 |x - target|_M^2.
         mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
@@ -34,6 +36,7 @@ class System:
         mesh: TetMesh,
         material: Material,
         *,
+        fibres: Sequence[Fibres] = (),
         gravity: Gravity,
         mass: MassKind,
         mass_damping: float,
@@ -49,6 +52,10 @@ class System:
         blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
         parameters = material.parameter_table(len(mesh.tets))
         self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
+        self.potentials = [
+            self.elastic,
+            *(_native.ElasticEnergy(blocks, f.kernels, f.parameter_table(mesh), threads) for f in fibres),
+        ]
         element_mass = per_element(material, material.density, len(mesh.tets)) * mesh.volumes()
         row_begin, columns, values = mass_matrix(mesh, element_mass, mass)
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
