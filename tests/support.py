@@ -135,4 +135,4 @@ def mechanical_energy(simulation: Simulation) -> float:
     system, state = simulation.system, simulation.state
     kinetic = 0.5 * float(np.sum(system.mass[:, None] * state.velocities**2))
     lift = state.positions - simulation.mesh.positions
-    return kinetic + system.elastic.value(state.positions) - float(np.sum(system.weight(state.time) * lift))
+    return kinetic + system.elastic.value(state.positions) - float(np.sum(system.gravity.forces(state.time) * lift))

@@ -5,12 +5,29 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from qlb.errors import InputError
+
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 LongArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 
-def vector(value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """`value` as a C-ordered float64 array of `shape` (a copy where needed)."""
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape))
+def vectors(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """`value` as a float64 array of `shape`, broadcast where needed; a copy.
+
+    Raises:
+        InputError: not numbers, another shape, or an entry that is not finite; the message names `name` and the entry.
+    """
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {value!r} is not an array of numbers") from None
+    if array.shape not in (shape, shape[-1:]):
+        allowed = " or ".join(str(s) for s in dict.fromkeys([shape[-1:], shape]))
+        raise InputError(f"{name} has shape {array.shape}, must be {allowed}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        where = f" of node {bad[0][0]}" if array.ndim > 1 else ""
+        raise InputError(f"{name}{where} is {array[bad[0][0]] if array.ndim > 1 else array}, must be finite")
+    return np.ascontiguousarray(np.broadcast_to(array, shape)).copy()

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from qlb.arrays import FloatArray, vector
+from qlb.arrays import FloatArray, vectors
 from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS, Integrator, State
 from qlb.materials import Fibres, Material
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
-from qlb.system import HeldNodes, Motion, StageProblem, System
-from qlb.system.system import Gravity, MassKind
+from qlb.system import Acceleration, HeldNodes, Motion, StageProblem, System
+from qlb.system.system import MassKind
 from qlb.timing import Timer
 
 T = TypeVar("T")
@@ -110,7 +110,7 @@ class Simulation:
         integrator: str = "BDF2",
         solver: str = "QLB",
         step: float = 1e-2,
-        gravity: Gravity = (0.0, -9.81, 0.0),
+        gravity: Acceleration = (0.0, -9.81, 0.0),
         velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
         mass: MassKind = "lumped",
         mass_damping: float = 0.0,
@@ -121,16 +121,20 @@ class Simulation:
     ) -> None:
         self._integrator = _choose("integrator", integrator, INTEGRATORS)()
         self._solver_class = _choose("solver", solver, SOLVERS)
-        _require("step", step, "> 0 s", np.isfinite(step) and step > 0)
-        _require("mass_damping", mass_damping, ">= 0 1/s", np.isfinite(mass_damping) and mass_damping >= 0)
+        _require("step", step, "> 0 s", _is_number(step) and step > 0)
+        _require("mass_damping", mass_damping, ">= 0 1/s", _is_number(mass_damping) and mass_damping >= 0)
         _require("mass", mass, "'lumped' or 'consistent'", mass in ("lumped", "consistent"))
         _require("on_failure", on_failure, "'stop', 'halve' or 'accept'", on_failure in ("stop", "halve", "accept"))
-        _require("threads", threads, ">= 1", threads is None or threads >= 1)
+        _require("threads", threads, ">= 1", threads is None or (isinstance(threads, int) and threads >= 1))
+        _require("material", material, "a Material", isinstance(material, Material))
+        _require("tolerance", tolerance, "a Tolerance", isinstance(tolerance, Tolerance | None))
+        settings_fit = isinstance(solver_settings, SolverSettings | None)
+        _require("solver_settings", solver_settings, "a SolverSettings", settings_fit)
         self.mesh = mesh
         self.material = material
         self.fibres = tuple(fibres)
         self.step = float(step)
-        self.gravity = gravity
+        self.gravity = gravity if callable(gravity) else tuple(vectors("gravity", gravity, (3,)))
         self.mass: MassKind = mass
         self.mass_damping = float(mass_damping)
         self.tolerance = tolerance or Tolerance()
@@ -141,9 +145,7 @@ class Simulation:
         """Wall-clock seconds by part, from the first step on."""
         self._held = HeldNodes(len(mesh.positions))
         self._steps_done = 0
-        v = vector(velocity, mesh.positions.shape)
-        _require("velocity", "an array", "finite", bool(np.isfinite(v).all()))
-        self._state = State(0.0, mesh.positions, v)
+        self._state = State(0.0, mesh.positions, vectors("velocity", velocity, mesh.positions.shape))
         self._system: System | None = None
         self._solver: Descent | None = None
 
@@ -201,7 +203,15 @@ class Simulation:
         return self._solver
 
     def restore(self, state: State, steps_done: int, solver: dict[str, FloatArray]) -> None:
-        """Go on from a checkpoint: a state, the number of steps behind it, and what `solver.save()` gave then."""
+        """Go on from a checkpoint: a state, the number of steps behind it, and what `solver.save()` gave then.
+
+        Raises:
+            InputError: positions or velocities of another shape, or not finite.
+        """
+        shape = self.mesh.positions.shape
+        for name, values in (("positions", state.positions), ("velocities", state.velocities)):
+            _require(f"shape of {name}", np.shape(values), str(shape), np.shape(values) == shape)
+            vectors(name, values, shape)
         self._state, self._steps_done = state, steps_done
         self.solver.load(solver)
 
@@ -225,7 +235,7 @@ class Simulation:
         if not result.converged and (self.on_failure != "accept" or not _finite(state)):
             raise StepFailed(_failure_message(result, self.solver.name), result)
         last = self._state
-        self._state = State(last.time + self.step, state.positions, state.velocities, last.without_history())
+        self._state = replace(state, time=last.time + self.step, previous=last.without_history())
         self._steps_done = step
         return result
 
@@ -287,6 +297,10 @@ def _choose(what: str, name: str, choices: dict[str, type[T]]) -> type[T]:
     if name not in choices:
         raise InputError(f"{what} = {name!r} is not known: must be one of {', '.join(choices)}")
     return choices[name]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
 
 
 def _require(name: str, value: object, allowed: str, ok: bool) -> None:

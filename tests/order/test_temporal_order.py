@@ -103,11 +103,14 @@ def errors(scenario: Scenario, integrator: str, what: str) -> Array:
 def test_order(scenario: Scenario, integrator: str, what: str) -> None:
     measured = errors(scenario, integrator, what)
     slope = fitted_slope(TIME / np.array(COUNTS[integrator]), measured)
-    expected = LEAST_ORDER[integrator]
+    # A consistent mass matrix hands the velocities of scripted nodes, see below, to their neighbours.
+    handed_on = scenario.scripted and scenario.mass == "consistent" and what == "velocities"
+    expected = 0.95 if integrator == "SDIRK2" and handed_on else LEAST_ORDER[integrator]
     assert expected <= slope <= expected + 0.3, f"{what} converge with order {slope:.3f}, errors {measured}"
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("BDF1", 0.95), ("BDF2", 1.9), ("SDIRK2", 1.95)])
+# Scripted positions are exact at every stage, from which SDIRK2, of stage order 1, infers velocities to order 1.
+@pytest.mark.parametrize(("integrator", "order"), [("BDF1", 0.95), ("BDF2", 1.9), ("SDIRK2", 0.95)])
 def test_order_of_the_velocities_of_scripted_nodes(integrator: str, order: float) -> None:
     counts, moved = COUNTS[integrator], right_end(MESH)
     ends = [end_of(SCENARIOS["scripted"], integrator, count).velocities[moved] for count in counts]

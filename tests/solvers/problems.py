@@ -12,11 +12,16 @@ from qlb.timing import Timer
 from tests.support import Array, left_end, make_system, small_bar
 
 
-def bar_system(cells: tuple[int, int, int] = (4, 2, 2), *, poisson: float = 0.4) -> System:
+def bar_system(
+    cells: tuple[int, int, int] = (4, 2, 2),
+    *,
+    poisson: float = 0.4,
+    gravity: tuple[float, float, float] = (0.0, -9.81, 0.0),
+) -> System:
     mesh = small_bar(cells)
     held = HeldNodes(len(mesh.positions))
     held.hold(left_end(mesh), mesh.positions)
-    return make_system(mesh, StableNeoHookean(poisson=poisson), held=held)
+    return make_system(mesh, StableNeoHookean(poisson=poisson), held=held, gravity=gravity)
 
 
 def swinging(system: System, time: float = 0.0) -> State:

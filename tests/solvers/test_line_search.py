@@ -14,7 +14,7 @@ class Curve:
     """A function of one variable with its derivative, in the guise of a stage problem."""
 
     def __init__(self, value: Callable[[float], float], derivative: Callable[[float], float]) -> None:
-        self.value, self.derivative = value, derivative
+        self.value, self.derivative, self.energy_rounding = value, derivative, 0.0
 
     def value_gradient(self, x: Array) -> tuple[float, Array]:
         return self.value(float(x[0])), np.array([self.derivative(float(x[0]))])

@@ -97,9 +97,9 @@ def test_gradient_is_the_derivative_of_the_value(system: System, rng: np.random.
 
 def test_weight_is_mass_times_gravity() -> None:
     system = make_system(TetMesh.box(cells=(2, 2, 2)), gravity=(1.0, -9.81, 0.5))
-    np.testing.assert_array_equal(system.weight(3.0), system.mass[:, None] * np.array([1.0, -9.81, 0.5]))
+    np.testing.assert_array_equal(system.gravity.forces(3.0), system.mass[:, None] * np.array([1.0, -9.81, 0.5]))
 
 
 def test_gravity_may_change_with_time() -> None:
     system = make_system(TetMesh.box(cells=(2, 2, 2)), gravity=lambda t: np.array([0.0, -2.0 * t, 0.0]))
-    np.testing.assert_array_equal(system.weight(3.0), system.mass[:, None] * np.array([0.0, -6.0, 0.0]))
+    np.testing.assert_array_equal(system.gravity.forces(3.0), system.mass[:, None] * np.array([0.0, -6.0, 0.0]))

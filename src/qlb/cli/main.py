@@ -116,6 +116,22 @@ def compare(
 
 
 @app.command()
+def reproduce(
+    figures: Annotated[list[str] | None, typer.Argument(metavar="[FIGURE]...", help="Numbers; by default all")] = None,
+    set_: SetOption = [],  # noqa: B006
+    steps: StepsOption = None,
+    out: Annotated[Path, typer.Option(help="Where to write, or to go on")] = Path("runs/reproduce"),
+    processes: Annotated[int | None, typer.Option(help="Runs at a time; by default one for each CPU")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Run everything in the output folder again")] = False,
+) -> None:
+    """Redraw figures of the paper's supplement: plots, their data and one page. The same call again goes on."""
+    from qlb.cli.reproduce import reproduce_figures
+
+    overrides = [*set_, *_overrides({"steps": steps})]
+    raise typer.Exit(reproduce_figures(figures or [], overrides, out, processes, overwrite=overwrite))
+
+
+@app.command()
 def scenes(
     show: Annotated[str | None, typer.Option(help="Print this scene as a file to start from")] = None,
 ) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from qlb import _native
-from qlb.arrays import FloatArray, vector
+from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.settings import PerElement, Settings, quantity
 
@@ -88,4 +88,4 @@ def per_element(material: Material, value: PerElement, elements: int) -> FloatAr
         raise InputError(
             f"a parameter of material {material.model} has shape {np.shape(value)}, must be one number or ({elements},)"
         )
-    return vector(value, (elements,))
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), (elements,)))

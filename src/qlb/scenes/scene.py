@@ -13,7 +13,8 @@ from qlb.materials import AnyMaterial, Fibres, StableNeoHookean
 from qlb.settings import Settings, choice, quantity
 from qlb.simulation import OnFailure, Simulation
 from qlb.solvers import SOLVERS, SolverSettings, Tolerance
-from qlb.system.system import Gravity, MassKind
+from qlb.system import Acceleration
+from qlb.system.system import MassKind
 
 Vector = tuple[float, float, float]
 
@@ -67,7 +68,7 @@ class Scene(Settings):
     def build(self) -> Simulation:
         """The simulation that the scene describes. Raises `InputError` where mesh or settings are wrong."""
 
-    def gravity(self) -> Gravity:
+    def gravity(self) -> Acceleration:
         """Gravity with its ramp."""
         acceleration, ramp = np.asarray(self.loads.gravity), self.loads.ramp
         if ramp is None:

@@ -103,7 +103,8 @@ class Descent(ABC):
         tolerance = self.tolerance
         if point.residual <= tolerance.relative * reference:
             return Reason.CONVERGED_RELATIVE
-        if point.residual <= max(tolerance.absolute, tolerance.scaled * problem.residual_scale):
+        goals = (tolerance.absolute, tolerance.scaled * problem.residual_scale, problem.residual_rounding)
+        if point.residual <= max(goals):
             return Reason.CONVERGED_ABSOLUTE
         return None
 

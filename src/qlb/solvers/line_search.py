@@ -37,9 +37,11 @@ class Point:
 def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) -> tuple[float, Point] | None:
     """The first of t = 1, 1/2, 1/4, ... that decreases E enough along `p`; None where none does.
 
-    Enough is Armijo's condition E(x + t p) <= E(x) + 1e-4 t g.p. Where the change of E is below 1e-11 |E|, rounding
-    hides it, and a point is taken if |g| does not grow. A trial that is not finite counts as too far.
+    Enough is Armijo's condition E(x + t p) <= E(x) + 1e-4 t g.p. Where the change of E is below 1e-11 |E|, or below
+    what rounding leaves of the element energies, a point is taken if |g| does not grow. A trial that is not finite
+    counts as too far.
     """
+    rounding = max(ROUNDING * abs(start.energy), problem.energy_rounding)
     t = 1.0
     for _ in range(MAX_HALVINGS):
         trial = Point.at(problem, start.x + t * p)
@@ -47,7 +49,7 @@ def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) 
             change = trial.energy - start.energy
             if change <= ARMIJO * t * slope:
                 return t, trial
-            if abs(change) <= ROUNDING * abs(start.energy) and trial.residual <= start.residual:
+            if abs(change) <= rounding and trial.residual <= start.residual:
                 return t, trial
         t *= 0.5
     return None

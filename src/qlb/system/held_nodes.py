@@ -56,6 +56,14 @@ class _Group:
     anchors: FloatArray
     motion: Motion | None
 
+    def positions(self, time: float) -> FloatArray:
+        if self.motion is None:
+            return self.anchors
+        target = np.asarray(self.motion(self.anchors, time), dtype=np.float64)
+        if target.shape != self.anchors.shape or not np.isfinite(target).all():
+            raise InputError(f"a motion gave positions of shape {target.shape} or not finite at time {time:g} s")
+        return target
+
 
 class HeldNodes:
     """Which degrees of freedom are held, and where they are at each time."""
@@ -100,10 +108,7 @@ class HeldNodes:
         """
         placed = positions.copy()
         for group in self._groups:
-            target = group.anchors if group.motion is None else np.asarray(group.motion(group.anchors, time))
-            if target.shape != group.anchors.shape or not np.isfinite(target).all():
-                raise InputError(f"a motion gave positions of shape {target.shape} or not finite at time {time:g} s")
-            placed[np.ix_(group.nodes, group.axes)] = target[:, group.axes]
+            placed[np.ix_(group.nodes, group.axes)] = group.positions(time)[:, group.axes]
         return placed
 
     @property

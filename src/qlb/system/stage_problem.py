@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from qlb import _native
 from qlb.arrays import FloatArray
 from qlb.integrators.integrator import Stage, State
@@ -22,13 +24,13 @@ class StageProblem:
         self.system = system
         self.stage = stage
         self.timer = timer
+        self._state = state
         self.start: FloatArray = system.held.place(state.positions, stage.time)
         """x_k [m] with the held nodes where they are at the stage's time, shape (n, 3)."""
-        self._state = state
         self._mass_scale = 1.0 + stage.c * system.mass_damping if stage.inertial else 0.0
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
-        self._load = self.force_scale * system.weight(stage.time)
-        self._load_at_rest = system.dot(self._load, system.mesh.positions)
+        guess = self.predictor()
+        self._potentials = [*system.potentials, *(term.at(stage, guess) for term in system.terms)]
         self._hessian: _native.BlockMatrix | None = None
 
     @property
@@ -41,12 +43,21 @@ class StageProblem:
         """|c^2 E_i V_i^(2/3)| over the nodes: the residual of a strain of order one (after Zhu et al. 2018)."""
         return self.force_scale * self.system.norm(self.system.stiffness)
 
+    @property
+    def residual_rounding(self) -> float:
+        """What rounding of the positions leaves of |g|: some eps of the mass times the largest coordinate."""
+        return 1e-15 * self._mass_scale * self.system.norm(self.system.mass) * float(np.abs(self.start).max())
+
+    @property
+    def energy_rounding(self) -> float:
+        """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e E_e V_e."""
+        return 4e-15 * self.force_scale * self.system.energy_scale
+
     def value_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
         """E and its gradient at positions `x` [m]: kg m^2 and kg m (J and N in quasistatics), gradient (n, 3)."""
-        system, gradient = self.system, -self._load
+        system, gradient, energy = self.system, np.zeros_like(x), 0.0
         with self.timer.section("gradient"):
-            energy = self._load_at_rest - system.dot(self._load, x)
-            for potential in system.potentials:
+            for potential in self._potentials:
                 energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
@@ -62,7 +73,7 @@ class StageProblem:
             if self._hessian is None:
                 self._hessian = _native.BlockMatrix(system.pattern)
             self._hessian.set_zero(system.threads)
-            for potential in system.potentials:
+            for potential in self._potentials:
                 potential.add_hessian(x, self.force_scale, project, self._hessian)
             if self.stage.inertial:
                 system.inertia.add_hessian(self._mass_scale, self._hessian)

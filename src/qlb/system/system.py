@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray, IntArray, LongArray, vector
+from qlb.arrays import FloatArray, IntArray, LongArray
 from qlb.errors import InputError
 from qlb.materials.fibres import Fibres
 from qlb.materials.material import Material, per_element
 from qlb.mesh.tet_mesh import TetMesh
+from qlb.system.gravity import Acceleration, Gravity
 from qlb.system.held_nodes import HeldNodes
+from qlb.system.potential import Potential, Term
 
-Gravity = tuple[float, float, float] | Callable[[float], FloatArray]
-"""Acceleration [m/s^2], constant or a function of time [s]."""
 MassKind = Literal["lumped", "consistent"]
 
 
@@ -26,9 +26,11 @@ class System:
     Attributes:
         elastic: the elastic energy of the material [J].
         potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
+        terms: what has another potential in each stage: loads, damping.
         inertia: 1/2 |x - target|_M^2.
         mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
+        energy_scale: sum of E_e V_e over the elements [J].
     """
 
     def __init__(
@@ -37,7 +39,7 @@ class System:
         material: Material,
         *,
         fibres: Sequence[Fibres] = (),
-        gravity: Gravity,
+        gravity: Acceleration,
         mass: MassKind,
         mass_damping: float,
         held: HeldNodes,
@@ -45,14 +47,13 @@ class System:
     ) -> None:
         self.mesh = mesh
         self.held = held
-        self.gravity = gravity
         self.mass_damping = mass_damping
         self.threads = threads
         self.pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
         blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
         parameters = material.parameter_table(len(mesh.tets))
         self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
-        self.potentials = [
+        self.potentials: list[Potential] = [
             self.elastic,
             *(_native.ElasticEnergy(blocks, f.kernels, f.parameter_table(mesh), threads) for f in fibres),
         ]
@@ -60,18 +61,17 @@ class System:
         row_begin, columns, values = mass_matrix(mesh, element_mass, mass)
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
         self.mass: FloatArray = np.add.reduceat(values, row_begin[:-1])
-        self.stiffness = _node_stiffness(mesh, per_element(material, material.modulus(), len(mesh.tets)))
+        self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
+        self.terms: list[Term] = [self.gravity]
+        modulus = per_element(material, material.modulus(), len(mesh.tets))
+        self.stiffness = _node_stiffness(mesh, modulus)
+        self.energy_scale = float(modulus @ mesh.volumes())
         self._fixed = np.flatnonzero(held.fixed.ravel())
 
     @property
     def nodes(self) -> int:
         """Number of nodes n."""
         return len(self.mesh.positions)
-
-    def weight(self, time: float) -> FloatArray:
-        """Forces of gravity at `time` [s] on the nodes [N], shape (n, 3)."""
-        acceleration = self.gravity(time) if callable(self.gravity) else self.gravity
-        return self.mass[:, None] * vector(acceleration, (3,))
 
     def clear_held(self, gradient: FloatArray) -> FloatArray:
         """Zero the entries of `gradient` (n, 3) that belong to held degrees of freedom, in place."""

@@ -1,0 +1,175 @@
+"""The figures of the supplement that can be redrawn: what each varies, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from qlb.errors import InputError
+from qlb.solvers import SOLVERS
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Nonlinear iterations a step."""
+
+    mean: float
+    max: int
+    failed: int | None = None
+    """steps that did not converge, where that is known"""
+
+    def __str__(self) -> str:
+        """As in "373 / 500, 80 failed"."""
+        return f"{self.mean:g} / {self.max}" + (f", {self.failed} failed" if self.failed else "")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a figure."""
+
+    label: str
+    name: str
+    """for folders, such as young-6e3"""
+    overrides: tuple[str, ...]
+    """KEY=VALUE of the scene"""
+    prototype: Mapping[str, Counts] = field(default_factory=dict)
+    """by solver: what an independent prototype needed for this very row (3000 tets, 120 steps)"""
+
+
+@dataclass(frozen=True)
+class SupplementFigure:
+    """A figure of the supplement: rows are a variation, columns are the solvers."""
+
+    number: int
+    title: str
+    parameter: str
+    """what the supplement varies, with its unit"""
+    scene: str
+    rows: tuple[Row, ...]
+    expectation: str
+    """what to look for: our reading, in our words"""
+
+
+def _counts(nd: Counts, qlf: Counts, qlb: Counts) -> dict[str, Counts]:
+    return {"ND": nd, "QLF": qlf, "QLB": qlb}
+
+
+_DEFAULT = _counts(Counts(6.6, 14), Counts(235, 461), Counts(7.4, 12))
+
+_STIFFNESS = SupplementFigure(
+    1,
+    "Stiffness",
+    "Young's modulus E [Pa]",
+    "bar",
+    (
+        Row(
+            "E = 6e3 Pa",
+            "young-6e3",
+            ("material.young=6e3",),
+            _counts(Counts(5.9, 15), Counts(185, 500), Counts(7.0, 19)),
+        ),
+        Row("E = 2e4 Pa", "young-2e4", ("material.young=2e4",), _DEFAULT),
+        Row("E = 5e4 Pa", "young-5e4", ("material.young=5e4",)),
+        Row(
+            "E = 1e5 Pa",
+            "young-1e5",
+            ("material.young=1e5",),
+            _counts(Counts(8.3, 21), Counts(373, 500, 80), Counts(9.8, 23)),
+        ),
+    ),
+    "The stiffer the bar, the more iterations QLF needs, up to steps that do not converge: its one factor, of the rest"
+    " shape, says less and less about a bar that has turned. ND and QLB grow by little.",
+)
+_INCOMPRESSIBILITY = SupplementFigure(
+    2,
+    "Incompressibility",
+    "Poisson's ratio nu",
+    "bar",
+    (
+        Row(
+            "nu = 0.42",
+            "poisson-0.42",
+            ("material.poisson=0.42",),
+            _counts(Counts(5.5, 12), Counts(34.7, 58), Counts(5.0, 7)),
+        ),
+        Row("nu = 0.49", "poisson-0.49", ("material.poisson=0.49",), _DEFAULT),
+    ),
+    "Close to incompressible, QLF needs several times what it needs at nu = 0.42; ND and QLB a few more.",
+)
+_HETEROGENEITY = SupplementFigure(
+    3,
+    "Heterogeneity",
+    "stiffness that differs from place to place: on, off",
+    "bar",
+    (
+        Row(
+            "heterogeneous",
+            "heterogeneous",
+            ("heterogeneous=true",),
+            _counts(Counts(12.4, 36), Counts(368, 500, 80), Counts(11.0, 17)),
+        ),
+        Row("homogeneous", "homogeneous", ("heterogeneous=false",), _DEFAULT),
+    ),
+    "With stiff and soft slabs in turn, all solvers need more; QLF fails in many steps, QLB stays near ND.",
+)
+_ANISOTROPY = SupplementFigure(
+    4,
+    "Anisotropy",
+    "fibres in the material: on, off",
+    "bar",
+    (
+        Row(
+            "anisotropic",
+            "anisotropic",
+            ("anisotropic=true",),
+            _counts(Counts(7.2, 14), Counts(184, 347), Counts(7.2, 11)),
+        ),
+        Row("isotropic", "isotropic", ("anisotropic=false",), _DEFAULT),
+    ),
+    "Fibres make little difference to ND and QLB; QLF stays more than ten times above them either way.",
+)
+_INTEGRATORS = SupplementFigure(
+    5,
+    "Integrators",
+    "time integrator",
+    "bar",
+    (
+        Row("BDF2", "BDF2", ("integrator=BDF2",), _DEFAULT),
+        Row("BDF1", "BDF1", ("integrator=BDF1",), _counts(Counts(8.8, 24), Counts(336, 500, 58), Counts(8.2, 13))),
+        Row("quasistatic", "quasistatic", ("integrator=quasistatic",)),
+    ),
+    "BDF1 needs more than BDF2, whose stage is two thirds as long, so that inertia helps it more. Quasistatics has no"
+    " inertia at all, and gravity grows over the whole run.",
+)
+
+FIGURES: dict[int, SupplementFigure] = {
+    figure.number: figure for figure in (_STIFFNESS, _INCOMPRESSIBILITY, _HETEROGENEITY, _ANISOTROPY, _INTEGRATORS)
+}
+"""Every figure that can be redrawn, by its number in the supplement."""
+
+IN_SUPPLEMENT = range(1, 11)
+
+
+def chosen_figures(names: Iterable[str] = ()) -> list[SupplementFigure]:
+    """The figures of the numbers in `names`, in order and each once; all where there is none.
+
+    Raises:
+        InputError: a figure that is not in the supplement, or that cannot be redrawn yet.
+    """
+    numbers = {_number(name) for name in names}
+    return [figure for figure in FIGURES.values() if not numbers or figure.number in numbers]
+
+
+def _number(name: str) -> int:
+    known = ", ".join(map(str, FIGURES))
+    number = int(name) if name.isascii() and name.isdigit() else 0
+    if number in FIGURES:
+        return number
+    if number in IN_SUPPLEMENT:
+        raise InputError(f"figure {number} cannot be redrawn yet, its scene does not exist; there are {known}")
+    raise InputError(f"figure {name!r} is not known; there are {known}")
+
+
+def column_solvers() -> list[str]:
+    """The columns of every figure: the solvers of the paper, then QLA where this qlb has it."""
+    return [name for name in ("ND", "QLF", "QLB", "QLA") if name in SOLVERS]

@@ -1,0 +1,40 @@
+"""One case in a process of its own: `python -m qlb.studies.reproduce_worker`, started by `reproduce_processes`.
+
+Reads {"scene": the resolved scene, "directory": the run directory} from standard input and writes a line "step N" to
+standard output after each step. Exit status 0: the run is complete; 1: it is not, and the last line says why.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from qlb.errors import QlbError
+from qlb.scenes import SCENES
+from qlb.simulation import StepResult
+from qlb.studies.run import run_scene
+
+
+def main() -> int:
+    """Run the case; the exit status."""
+    job = json.load(sys.stdin)
+    scene = SCENES[job["scene"]["scene"]].parse(job["scene"])
+    try:
+        outcome = run_scene(scene, Path(job["directory"]), overwrite=True, on_step=_tell)
+    except QlbError as error:
+        sys.stdout.write(f"{error}\n")
+        return 1
+    if outcome.summary["status"] != "complete":
+        sys.stdout.write(f"{outcome.summary['error'] or outcome.summary['status']}\n")
+        return 1
+    return 0
+
+
+def _tell(result: StepResult) -> None:
+    sys.stdout.write(f"step {result.step}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

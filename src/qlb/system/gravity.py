@@ -1,0 +1,28 @@
+"""Gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qlb.arrays import FloatArray, vectors
+from qlb.integrators.integrator import Stage
+from qlb.system.potential import DeadLoad
+
+Acceleration = tuple[float, float, float] | Callable[[float], FloatArray]
+"""[m/s^2], constant or a function of time [s]."""
+
+
+class Gravity:
+    """The weight of every node: its share of the mass [kg] times an acceleration."""
+
+    def __init__(self, mass: FloatArray, acceleration: Acceleration, rest: FloatArray, threads: int) -> None:
+        self._mass, self._acceleration, self._rest, self._threads = mass, acceleration, rest, threads
+
+    def forces(self, time: float) -> FloatArray:
+        """Forces on the nodes [N] at `time` [s], shape (n, 3)."""
+        a = self._acceleration(time) if callable(self._acceleration) else self._acceleration
+        return self._mass[:, None] * vectors("gravity", a, (3,))
+
+    def at(self, stage: Stage, guess: FloatArray) -> DeadLoad:
+        """A dead load at the stage's time."""
+        return DeadLoad(self.forces(stage.time), self._rest, self._threads)

@@ -1,0 +1,42 @@
+"""What adds to the energy of a stage: potentials, and the terms of a system that give one for each stage."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from qlb import _native
+from qlb.arrays import FloatArray
+from qlb.integrators.integrator import Stage
+
+
+class Potential(Protocol):
+    """A function Phi(x) [J] of the positions (n, 3) [m]; forces are minus its gradient."""
+
+    def add_value_gradient(self, x: FloatArray, scale: float, gradient: FloatArray, /) -> float:
+        """Add scale dPhi/dx to `gradient` (n, 3) and return scale Phi."""
+
+    def add_hessian(self, x: FloatArray, scale: float, project: bool, matrix: _native.BlockMatrix, /) -> None:
+        """Add scale d2Phi/dx2 to `matrix`, projected to positive semidefinite where asked."""
+
+
+class Term(Protocol):
+    """A load, a damping or any other part of a system whose potential differs from stage to stage."""
+
+    def at(self, stage: Stage, guess: FloatArray) -> Potential:
+        """Its potential in a stage. `guess` (n, 3) [m] is a prediction of the stage's positions, of second order."""
+
+
+class DeadLoad:
+    """Phi = -f.(x - X): forces that do not depend on the positions."""
+
+    def __init__(self, forces: FloatArray, rest: FloatArray, threads: int) -> None:
+        self._forces, self._threads = forces, threads
+        self._at_rest = _native.dot(forces, rest, threads)
+
+    def add_value_gradient(self, x: FloatArray, scale: float, gradient: FloatArray, /) -> float:
+        """Forces f (n, 3) [N] act against the gradient."""
+        gradient -= scale * self._forces
+        return scale * (self._at_rest - _native.dot(self._forces, x, self._threads))
+
+    def add_hessian(self, x: FloatArray, scale: float, project: bool, matrix: _native.BlockMatrix, /) -> None:
+        """Nothing: the potential is linear."""
