@@ -4,18 +4,40 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, Self, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic._internal._model_construction import ModelMetaclass
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticSerializationError
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
+from qlb.fields import Expression, Function, RegionTable, Varying
+from qlb.mesh.tet_mesh import TetMesh
 
-PerElement = float | FloatArray
-"""One value for all elements, or an array with one value per element."""
+
+def plain(value: Any) -> Any:
+    """The value of a field as plain data. Raises `InputError` for a Python function."""
+    if isinstance(value, Varying):
+        return value.written()
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+PerElement = Annotated[float | FloatArray | Varying, PlainSerializer(plain, when_used="json")]
+"""A value in each element: one number for all, an array (m,), a table by region {1: 2e4, "default": 5e4}, an expression
+of the rest position such as "2e4 * (1 + x)", or a function of the elements' centroids (m, 3) [m] that gives (m,)."""
+
+T = TypeVar("T", bound="Settings")
 
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
@@ -71,6 +93,19 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
         except ValidationError as error:
             raise InputError(_one_line(cls, error)) from None
 
+    def model_dump(self, **options: Any) -> dict[str, Any]:
+        """As pydantic's. Raises `InputError` for what plain data cannot hold, such as a Python function."""
+        try:
+            return super().model_dump(**options)
+        except PydanticSerializationError as error:
+            raise InputError(str(error).partition("InputError: ")[2] or str(error)) from None
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one class and have equal values."""
+        if not isinstance(other, Settings) or type(self) is not type(other):
+            return NotImplemented
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in type(self).model_fields)
+
     @field_validator("*", mode="before")
     @classmethod
     def _check_range(cls, value: Any, info: ValidationInfo) -> Any:
@@ -82,16 +117,100 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
                 raise ValueError(f"{value!r} is not known: must be one of {', '.join(options)}")
         if "bounds" in extra and value is not None:
             bounds: Any = extra["bounds"]
+            if _may_vary(field.annotation):
+                value = _as_varying(value)
             return _checked(value, bounds, str(extra["unit"]), whole=field.annotation is int)
         return value
 
 
+def on_mesh(settings: T, owner: str, mesh: TetMesh) -> T:
+    """A copy in which each `PerElement` is a number or an array (m,), checked in every element of `mesh`.
+
+    Args:
+        settings: what has the parameters.
+        owner: what to call it in an error, such as "material".
+        mesh: with m elements.
+
+    Raises:
+        InputError: an array of another length, a region that a table lacks, a value out of range or not finite in some
+            element. The message names the parameter and the element.
+    """
+    values = {}
+    for name, field in type(settings).model_fields.items():
+        value = getattr(settings, name)
+        if _may_vary(field.annotation) and isinstance(value, np.ndarray | Varying):
+            values[name] = _element_values(f"{owner} {name}", value, field, mesh)
+    return settings.model_copy(update=values)
+
+
+def require_numbers(settings: Settings, owner: str) -> None:
+    """Raise `InputError` where a parameter has its values only on a mesh."""
+    for name in type(settings).model_fields:
+        value = getattr(settings, name)
+        if isinstance(value, Varying):
+            raise InputError(f"{owner} {name} is {value}: it has its values only on a mesh, see {owner}.on(mesh)")
+
+
+def _element_values(name: str, value: FloatArray | Varying, field: FieldInfo, mesh: TetMesh) -> FloatArray:
+    count = len(mesh.tets)
+    try:
+        values = value.on(mesh) if isinstance(value, Varying) else value
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    if values.shape != (count,):
+        raise InputError(f"{name} has shape {values.shape}, must be one number or ({count},)")
+    extra: Any = field.json_schema_extra or {}
+    bounds = extra.get("bounds", {})
+    bad = _outside(values, bounds)
+    if bad.any():
+        e = int(np.argmax(bad))
+        allowed = describe_range(bounds, str(extra.get("unit", ""))) if np.isfinite(values[e]) else "finite"
+        raise InputError(f"{name} of element {e} = {values[e]:g} is out of range: must be {allowed}")
+    values.setflags(write=False)
+    return values
+
+
+def _may_vary(annotation: Any) -> bool:
+    """Whether a field of this type is a `PerElement`."""
+    return annotation is Varying or any(map(_may_vary, get_args(annotation)))
+
+
+def _as_varying(value: Any) -> Any:
+    """`value`, made a table, an expression or a function where it is written as one."""
+    if isinstance(value, Mapping):
+        return RegionTable.parse(value)
+    if isinstance(value, str) and not _is_number(value):
+        return Expression(value)
+    return Function(value) if callable(value) else value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b)
+    return bool(a == b)
+
+
 def _checked(value: Any, bounds: Mapping[str, float], unit: str, *, whole: bool) -> Any:
-    """`value` as a float, an array of floats or (where `whole`) an int, all of it within `bounds`."""
+    """`value` as a float, an array of floats or (where `whole`) an int, all of it within `bounds`.
+
+    Of what varies in space, what is known without a mesh is checked: the values of a table, and those of an expression
+    without x, y and z.
+    """
+    if isinstance(value, Varying):
+        for where, number in _known_values(value):
+            if _outside(np.float64(number), bounds):
+                raise ValueError(f"{where} = {number:g} is out of range: must be {describe_range(bounds, unit)}")
+        return value
     numbers = _as_numbers(value)
-    bad = ~np.isfinite(numbers)
-    for name, limit in bounds.items():
-        bad |= ~_satisfies(name, numbers, limit)
+    bad = _outside(numbers, bounds)
     if whole:
         bad |= np.floor(numbers) != numbers
     if bad.any():
@@ -100,20 +219,38 @@ def _checked(value: Any, bounds: Mapping[str, float], unit: str, *, whole: bool)
         kind = "a whole number " if whole else ""
         raise ValueError(f"{first:g}{where} is out of range: must be {kind}{describe_range(bounds, unit)}")
     if numbers.ndim:
+        numbers.setflags(write=False)
         return numbers
     return int(numbers) if whole else float(numbers)
+
+
+def _known_values(value: Varying) -> list[tuple[str, float]]:
+    """Where in `value`, and which number, for those that are known without a mesh."""
+    if isinstance(value, RegionTable):
+        return [(f"region {key}" if isinstance(key, int) else key, v) for key, v in value.written().items()]
+    if isinstance(value, Expression) and value.is_constant:
+        return [(str(value), float(value.at(np.zeros((1, 3)))[0]))]
+    return []
 
 
 def _as_numbers(value: Any) -> FloatArray:
     try:
         if isinstance(value, bool):
             raise TypeError
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{value!r} is not a number") from None
 
 
-def _satisfies(name: str, numbers: FloatArray, limit: float) -> Any:
+def _outside(numbers: FloatArray | np.float64, bounds: Mapping[str, float]) -> Any:
+    """Where `numbers` are not finite or not within `bounds`."""
+    bad = ~np.isfinite(numbers)
+    for name, limit in bounds.items():
+        bad |= ~_satisfies(name, numbers, limit)
+    return bad
+
+
+def _satisfies(name: str, numbers: FloatArray | np.float64, limit: float) -> Any:
     with np.errstate(invalid="ignore"):
         return {
             "gt": np.greater,

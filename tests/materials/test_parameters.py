@@ -52,7 +52,7 @@ def test_an_array_of_another_length_is_refused(material_class: type[Material]) -
         ({"young": np.nan}, "young: nan is out of range: must be > 0 Pa"),
         ({"young": np.inf}, "young: inf is out of range: must be > 0 Pa"),
         ({"young": [1.0, 2.0, -3.0]}, "young: -3 at index 2 is out of range: must be > 0 Pa"),
-        ({"young": "stiff"}, "young: 'stiff' is not a number"),
+        ({"young": ["stiff"]}, "young: ['stiff'] is not a number"),
         ({"young": True}, "young: True is not a number"),
         ({"poisson": 0.5}, "poisson: 0.5 is out of range: must be > -1 and < 0.5"),
         ({"poisson": -1.0}, "poisson: -1 is out of range: must be > -1 and < 0.5"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qlb import Simulation, StableNeoHookean, TetMesh
+from qlb import Simulation, SolverSettings, StableNeoHookean, TetMesh
 from tests.support import Array, left_end, right_end
 
 MESH = TetMesh.box((0.75, 0.25, 0.25), cells=(8, 3, 3))
@@ -63,3 +63,34 @@ def test_a_bar_that_has_come_to_rest_stays_there(solver: str) -> None:
     for result in simulation.run(5):
         assert result.converged
     np.testing.assert_allclose(simulation.state.positions, resting, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+def test_an_equilibrium_under_a_constant_load_is_found_again(poisson: float, solver: str) -> None:
+    # From the second step on |g(x_k)| is nothing but what the first has left.
+    material = StableNeoHookean(young=1e5, poisson=poisson)
+    simulation = bar(integrator="quasistatic", solver=solver, material=material, gravity=(0.0, -0.1, 0.0))
+    first = simulation.advance().positions
+    for _ in simulation.run(4):
+        pass
+    np.testing.assert_allclose(simulation.state.positions, first, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2", "quasistatic"])
+def test_a_light_load_moves_a_nearly_incompressible_body(integrator: str, solver: str) -> None:
+    # Rounding of the positions alone makes forces of eps |K||x|, K here 1700 times Young's modulus: with 6144 tets
+    # 1e-8 N, where the load is 1e-3 N. What is left of it must not keep a solve from ending.
+    mesh = TetMesh.box((0.75, 0.25, 0.25), cells=(16, 8, 8))
+    simulation = Simulation(
+        mesh,
+        material=StableNeoHookean(young=1e5, poisson=0.4999),
+        integrator=integrator,
+        solver=solver,
+        gravity=(0.0, -1e-4, 0.0),
+        solver_settings=SolverSettings(max_iterations=60),
+    )
+    simulation.pin(left_end(mesh))
+    assert all(result.converged for result in simulation.run(3))
+    assert (simulation.state.positions - mesh.positions)[right_end(mesh), 1].max() < 0

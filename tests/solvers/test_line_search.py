@@ -85,6 +85,14 @@ def test_where_rounding_hides_the_change_a_smaller_gradient_is_taken() -> None:
     assert accepted(curve, 1e-3, -1e-3) == (1.0, 0.0)
 
 
+def test_where_elements_cancel_a_change_within_their_rounding_is_hidden_too() -> None:
+    # The energy is small, but the terms that it is the sum of are not.
+    curve = Curve(lambda x: 1e-9 if x == 1 else 1e-9 + 3e-16, lambda x: x)
+    assert search(curve, 1.0, -1.0) is None
+    curve.energy_rounding = 1e-15
+    assert accepted(curve, 1.0, -1.0) == (1.0, 0.0)
+
+
 def test_where_rounding_hides_the_change_a_larger_gradient_is_not_taken() -> None:
     curve = Curve(lambda x: 1e6, lambda x: 1e-9 * (1 + x * x))
     assert search(curve, 1.0, 1.0, slope=-1e-9) is None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from qlb import State, TetMesh, Translation
+from qlb import StableNeoHookean, State, TetMesh, Translation
 from qlb.integrators import INTEGRATORS, Stage
 from qlb.system import HeldNodes, StageProblem, System
 from qlb.timing import Timer
@@ -205,3 +205,26 @@ def test_evaluation_leaves_the_positions_alone(case: Case) -> None:
     case.problem.value_gradient(case.x)
     case.problem.hessian(case.x, project=True)
     np.testing.assert_array_equal(case.x, before)
+
+
+@pytest.mark.parametrize("integrator", ["BDF1", "quasistatic"])
+@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+@pytest.mark.parametrize("cells", [(4, 2, 2), (16, 8, 8)], ids=str)
+def test_rounding_is_no_larger_than_the_problem_says(
+    cells: tuple[int, int, int], poisson: float, integrator: str, rng: np.random.Generator
+) -> None:
+    # Positions off by an eps change E and g by what cannot be resolved, and the end of a solve rests on it. Stored
+    # positions are off by a third of that, root mean square.
+    mesh = jittered(TetMesh.box((0.75, 0.25, 0.25), cells=cells), rng, 0.2)
+    system = make_system(mesh, StableNeoHookean(poisson=poisson), gravity=(0.0, -1e-6, 0.0))
+    state = State(0.0, mesh.positions, np.zeros_like(mesh.positions))
+    problem = StageProblem(system, stage_of(integrator, 0, state, rng), state, Timer())
+    x = mesh.positions * (1 + 1e-7)
+    energies, changes = [], []
+    reference = problem.value_gradient(x)[1]
+    for _ in range(20):
+        energy, gradient = problem.value_gradient(x * (1 + 2e-16 * rng.integers(-1, 2, size=x.shape)))
+        energies.append(energy)
+        changes.append(problem.residual(gradient - reference))
+    assert np.ptp(energies) <= problem.energy_rounding
+    assert np.mean(changes) <= 3 * problem.residual_rounding

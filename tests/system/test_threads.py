@@ -87,6 +87,7 @@ def test_a_whole_run(mesh: TetMesh, solver: str) -> None:
     np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)
 
 
+@pytest.mark.slow
 def test_threads_inside_a_large_factor_change_rounding_only() -> None:
     # From 1e9 operations on the factor gives BLAS all threads, whose sums depend on how many there are; two runs with
     # the same number agree to the bit all the same.

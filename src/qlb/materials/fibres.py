@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,7 @@ from pydantic import Field
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.mesh import TetMesh
-from qlb.settings import PerElement, Settings, quantity
+from qlb.settings import PerElement, Settings, on_mesh, quantity
 
 Direction = tuple[float, float, float] | FloatArray | Callable[[FloatArray], FloatArray]
 
@@ -40,11 +40,12 @@ class Fibres(Settings):
         """mu and the unit direction of each element, shape (m, 4).
 
         Raises:
-            InputError: directions of another shape, or one that is not finite or has no length; the element is named.
+            InputError: a modulus that does not fit the mesh or is out of range, directions of another shape, or one
+                that is not finite or has no length; the element is named.
         """
         count = len(mesh.tets)
-        centroids = mesh.positions[mesh.tets].mean(axis=1)
-        given = self.direction(centroids) if callable(self.direction) else self.direction
+        modulus: Any = on_mesh(self, "fibre", mesh).modulus
+        given = self.direction(mesh.centroids()) if callable(self.direction) else self.direction
         directions = np.asarray(given, dtype=np.float64)
         if directions.shape not in ((3,), (count, 3)):
             raise InputError(f"fibre directions have shape {directions.shape}, must be (3,) or ({count}, 3)")
@@ -54,7 +55,5 @@ class Fibres(Settings):
         if bad.any():
             e = int(np.argmax(bad))
             raise InputError(f"fibre direction of element {e} is {directions[e].tolist()}, must have a length > 0")
-        if np.ndim(self.modulus) and np.shape(self.modulus) != (count,):
-            raise InputError(f"fibre modulus has shape {np.shape(self.modulus)}, must be one number or ({count},)")
-        modulus = np.broadcast_to(self.modulus, (count,))
-        return np.ascontiguousarray(np.column_stack([modulus, directions / length[:, None]]))
+        columns = [np.broadcast_to(modulus, (count,)), directions / length[:, None]]
+        return np.ascontiguousarray(np.column_stack(columns))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +11,16 @@ import numpy.typing as npt
 from qlb import _native
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
-from qlb.settings import PerElement, Settings, quantity
+from qlb.fields import Varying
+from qlb.mesh.tet_mesh import TetMesh
+from qlb.settings import PerElement, Settings, on_mesh, quantity, require_numbers
 
 
 class Material(Settings):
     """A hyperelastic solid: an energy density psi(F) [Pa] and a mass density.
 
-    Any parameter may be one number or an array with one value per element.
+    Any parameter may be one number, or vary in space: an array with one value per element, a table by region, an
+    expression or a function of the rest position (see `PerElement`). What varies has its values on a mesh: `on`.
     """
 
     model: str
@@ -32,12 +36,26 @@ class Material(Settings):
     def modulus(self) -> PerElement:
         """A stiffness [Pa] that stands for the material where a scale is needed, such as Young's modulus."""
 
+    def wave_modulus(self) -> PerElement:
+        """The stiffness of small strains without sideways motion [Pa], the largest of the material: lambda + 2 mu."""
+        return self.modulus()
+
+    def on(self, mesh: TetMesh) -> Self:
+        """The same material with each parameter a number or an array (m,), for the m elements of `mesh`.
+
+        Raises:
+            InputError: a parameter that does not fit the mesh or is out of range; the element or region is named.
+        """
+        return on_mesh(self, "material", mesh)
+
     def parameter_table(self, elements: int) -> FloatArray:
         """`kernel_parameters` for each element, shape (elements, count).
 
         Raises:
-            InputError: a parameter array whose length is not `elements`.
+            InputError: a parameter array whose length is not `elements`; a table, an expression or a function, which
+                have their values only on a mesh.
         """
+        require_numbers(self, "material")
         columns = [per_element(self, value, elements) for value in self.kernel_parameters()]
         return np.ascontiguousarray(np.stack(columns, axis=1))
 
@@ -50,6 +68,9 @@ class Material(Settings):
             F: deformation gradients, shape (k, 3, 3).
             project: give the nearest positive semidefinite second derivative instead of the exact one.
             simd_level: which compiled level to use; empty for the best of this machine.
+
+        Raises:
+            InputError: as `parameter_table`.
 
         Returns:
             psi [Pa], shape (k,); first Piola-Kirchhoff stress dpsi/dF [Pa], shape (k, 3, 3); d2psi/dF2 [Pa], shape
@@ -72,6 +93,11 @@ class IsotropicMaterial(Material):
         """Young's modulus [Pa]."""
         return self.young
 
+    def wave_modulus(self) -> PerElement:
+        """lambda + 2 mu [Pa]."""
+        mu, lam = self.lame()
+        return lam + 2 * mu
+
     def lame(self) -> tuple[PerElement, PerElement]:
         """Lame's constants (mu, lambda) [Pa] of linear elasticity."""
         mu = self.young / (2 * (1 + self.poisson))
@@ -84,6 +110,8 @@ class IsotropicMaterial(Material):
 
 def per_element(material: Material, value: PerElement, elements: int) -> FloatArray:
     """`value` as an array over `elements`. Raises `InputError` where an array has another length."""
+    if isinstance(value, Varying):
+        raise InputError(f"a parameter of material {material.model} is {value}: see material.on(mesh)")
     if np.ndim(value) and np.shape(value) != (elements,):
         raise InputError(
             f"a parameter of material {material.model} has shape {np.shape(value)}, must be one number or ({elements},)"

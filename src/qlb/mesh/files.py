@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from qlb.arrays import FloatArray, IntArray
+from qlb.arrays import FloatArray, IntArray, LongArray
 from qlb.errors import InputError
 
+# Cell data that hold the region of each tet, the first that a file has: our own, gmsh's, Medit's.
+REGION_DATA = ("region", "gmsh:physical", "medit:ref")
 
-def read_tets(path: Path) -> tuple[FloatArray, IntArray]:
-    """Positions [m] (n, 3) and tets (m, 4) of a mesh file, without unused nodes; see `TetMesh.read`."""
+
+def read_tets(path: Path) -> tuple[FloatArray, IntArray, LongArray | None]:
+    """Positions [m] (n, 3), tets (m, 4) without unused nodes, and regions (m,) of a mesh file; see `TetMesh.read`."""
     import meshio
 
     if not path.is_file():
@@ -32,4 +36,17 @@ def read_tets(path: Path) -> tuple[FloatArray, IntArray]:
     if used[0] < 0 or used[-1] >= len(data.points):
         bad = used[-1] if used[0] >= 0 else used[0]
         raise InputError(f"mesh file {path}: node index {bad} is outside its {len(data.points)} nodes")
-    return np.asarray(data.points, dtype=np.float64)[used, :3], renumbered.reshape(-1, 4).astype(np.int32)
+    positions = np.asarray(data.points, dtype=np.float64)[used, :3]
+    return positions, renumbered.reshape(-1, 4).astype(np.int32), _regions(data)
+
+
+def _regions(data: Any) -> LongArray | None:
+    """The region of each tet of a meshio mesh, shape (m,), where it has such data and they are whole numbers."""
+    for name in REGION_DATA:
+        if name in data.cell_data:
+            pairs = zip(data.cells, data.cell_data[name], strict=True)
+            values = np.concatenate([np.asarray(given) for block, given in pairs if block.type == "tetra"])
+            whole = values.ndim == 1 and values.dtype.kind in "iuf" and np.isfinite(values).all()
+            if whole and (np.floor(values) == values).all():
+                return values.astype(np.int64)
+    return None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from qlb.arrays import BoolArray, FloatArray, IntArray
+from qlb.arrays import BoolArray, FloatArray, IntArray, LongArray
 from qlb.errors import InputError
 from qlb.mesh.box import kuhn_box
 from qlb.mesh.files import read_tets
@@ -25,13 +25,15 @@ class TetMesh:
     Attributes:
         positions: rest positions [m], shape (n, 3), float64.
         tets: node indices, shape (m, 4), int32, positively oriented: det(x1 - x0, x2 - x0, x3 - x0) > 0.
+        regions: id of the region of each tet, shape (m,), int64, for parameters that differ from region to region; or
+            None.
 
     Raises:
         InputError: a NaN position, an index out of range, a tet that names a node twice, is flat or inverted, a node
-            that no tet uses. The message names the first such tet or node.
+            that no tet uses. The message names the first such tet or node. Regions that are not (m,) integers.
     """
 
-    def __init__(self, positions: npt.ArrayLike, tets: npt.ArrayLike) -> None:
+    def __init__(self, positions: npt.ArrayLike, tets: npt.ArrayLike, *, regions: npt.ArrayLike | None = None) -> None:
         x, t = _array("positions", positions, np.float64), _array("tets", tets)
         if x.ndim != 2 or x.shape[1] != 3:
             raise InputError(f"positions have shape {x.shape}, must be (n, 3)")
@@ -42,6 +44,7 @@ class TetMesh:
         _check_indices(t, len(x))
         self.positions: FloatArray = x
         self.tets: IntArray = t.astype(np.int32, order="C")
+        self.regions: LongArray | None = None if regions is None else _regions(regions, len(t))
         _check_geometry(self)
         self.positions.setflags(write=False)
         self.tets.setflags(write=False)
@@ -57,16 +60,22 @@ class TetMesh:
     def read(path: str | Path) -> TetMesh:
         """Read the tetrahedra of a mesh file in any format that meshio knows (gmsh, VTK, Medit, ...).
 
-        Nodes that no tetrahedron uses are dropped.
+        Nodes that no tetrahedron uses are dropped. Regions are the first of the whole-numbered cell data "region",
+        "gmsh:physical" and "medit:ref" that the file has.
 
         Raises:
             InputError: the file is missing, unreadable, has no tetrahedra, or fails the checks of `TetMesh`.
         """
-        return TetMesh(*read_tets(Path(path)))
+        positions, tets, regions = read_tets(Path(path))
+        return TetMesh(positions, tets, regions=regions)
 
     def nodes_where(self, condition: Callable[[FloatArray], BoolArray]) -> IntArray:
         """Indices of the nodes whose rest positions meet `condition`: (n, 3) positions [m] -> (n,) booleans."""
         return np.flatnonzero(condition(self.positions)).astype(np.int32)
+
+    def centroids(self) -> FloatArray:
+        """Rest positions of the centroids of the tets [m], shape (m, 3)."""
+        return np.asarray(self.positions[self.tets].mean(axis=1), dtype=np.float64)
 
     def volumes(self) -> FloatArray:
         """Signed rest volumes [m^3], shape (m,)."""
@@ -91,6 +100,17 @@ def _array(name: str, values: npt.ArrayLike, dtype: npt.DTypeLike | None = None)
         return np.array(values, dtype=dtype, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} are not an array of numbers: {' '.join(str(error).split())}") from None
+
+
+def _regions(values: npt.ArrayLike, elements: int) -> LongArray:
+    regions = _array("regions", values)
+    if not np.issubdtype(regions.dtype, np.integer):
+        raise InputError(f"regions have type {regions.dtype}, must be integers")
+    if regions.shape != (elements,):
+        raise InputError(f"regions have shape {regions.shape}, must be ({elements},), one for each tet")
+    regions = regions.astype(np.int64)
+    regions.setflags(write=False)
+    return regions
 
 
 def _check_indices(tets: npt.NDArray[np.integer], nodes: int) -> None:

@@ -7,11 +7,12 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from qlb.results import style
@@ -70,11 +71,15 @@ def grid_csv(grid: FigureGrid) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)
     for label, solver, run in grid.cells():
-        for stage, curve in enumerate(_curves(run) if run else [], start=1):
-            for step, iterations, converged in zip(*(column.tolist() for column in curve), strict=True):
-                row = (grid.number, label, solver, step, stage, iterations, str(converged).lower())
-                writer.writerow(row)
+        writer.writerows((grid.number, label, solver, *row) for row in (_stage_rows(run) if run else []))
     return text.getvalue()
+
+
+def _stage_rows(run: Run) -> Iterator[tuple[int, int, int, str]]:
+    """Step, stage, iterations and whether it converged, of each solve."""
+    for stage in range(1, int(run.stats["stage"].max(initial=0)) + 1):
+        for step, iterations, converged in zip(*map(np.ndarray.tolist, run.iterations_per_step(stage)), strict=True):
+            yield step, stage, iterations, str(converged).lower()
 
 
 def draw_grid(grid: FigureGrid) -> Figure:
@@ -98,7 +103,12 @@ def draw_grid(grid: FigureGrid) -> Figure:
 
 
 def _curves(run: Run) -> list[StepIterations]:
-    """Iterations by step, one curve for each stage of the integrator."""
+    """Iterations by step, one curve for each stage of the integrator.
+
+    A first step by SDIRK2, with which BDF2 starts, does not make two curves: both its stages count in one.
+    """
+    if run.stages == 1:
+        return [run.iterations_per_step()]
     return [run.iterations_per_step(stage) for stage in range(1, run.stages + 1)]
 
 
@@ -107,7 +117,8 @@ def _draw_panel(ax: Axes, run: Run | None) -> None:
         ax.text(0.5, 0.5, "no run", transform=ax.transAxes, ha="center", va="center", color=style.FAINT)
         return
     curves = _curves(run)
-    for curve, colour, width in zip(curves, (style.BLUE, style.RED), (2.0 if len(curves) > 1 else 1.3, 1.0)):  # noqa: B905
+    looks = ((style.BLUE, 1.3),) if len(curves) == 1 else ((style.BLUE, 2.0), (style.RED, 1.0))
+    for curve, (colour, width) in zip(curves, looks, strict=True):
         marker = "o" if len(curve.steps) < 3 else ""
         ax.step(curve.steps, curve.iterations, where="mid", color=colour, linewidth=width, marker=marker, markersize=3)
     _mark_failed(ax, curves)
@@ -130,45 +141,56 @@ def _mark_failed(ax: Axes, curves: list[StepIterations]) -> None:
 
 def _write_counts(ax: Axes, run: Run) -> None:
     s = run.summary
-    ax.text(0.02, 0.97, counts_text(s["iterations_mean"], s["iterations_max"]), transform=ax.transAxes, va="top")
+    _write(ax, f"mean {s['iterations_mean']:.3g}, max {s['iterations_max']}", "left", style.INK)
     failed = len(s["failed_steps"])
-    if failed or s["status"] == "failed":
-        text = "stopped" if s["status"] == "failed" else f"{failed} of {s['steps']} failed"
-        ax.text(0.98, 0.97, text, transform=ax.transAxes, va="top", ha="right", color=style.RED)
+    if s["status"] == "failed":
+        _write(ax, f"stopped after step {s['steps']}", "right", style.RED)
+    elif failed:
+        _write(ax, f"{failed} of {s['steps']} failed", "right", style.RED)
 
 
-def counts_text(mean: float, most: int) -> str:
-    """Mean and maximum of iterations in a few words."""
-    return f"mean {mean:.3g}, max {most}"
+def _write(ax: Axes, text: str, side: Literal["left", "right"], colour: str) -> None:
+    """A text in an upper corner, on white so that the grid does not cross it."""
+    ax.text(
+        0.02 if side == "left" else 0.98,
+        0.97,
+        text,
+        transform=ax.transAxes,
+        ha=side,
+        va="top",
+        color=colour,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+    )
 
 
 def _scale(ax: Axes, curves: Sequence[StepIterations]) -> None:
     """The range of y that a column shares: from 0, or logarithmic where its panels lie far apart."""
-    means = [max(1.0, float(curve.iterations.mean())) for curve in curves if len(curve.iterations)]
-    highest = max((int(curve.iterations.max()) for curve in curves if len(curve.iterations)), default=1)
-    if means and max(means) > LOGARITHMIC * min(means):
+    highest = [max(1, int(curve.iterations.max())) for curve in curves if len(curve.iterations)] or [1]
+    if max(highest) > LOGARITHMIC * min(highest):
         lowest = min(int(curve.iterations.min()) for curve in curves if len(curve.iterations))
         ax.set_yscale("symlog", linthresh=1, linscale=0.3)
-        ax.set_ylim(0 if lowest == 0 else 1, 6 * highest)
+        ax.set_ylim(0 if lowest == 0 else 1, 6 * max(highest))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
-        ax.set_ylim(0, _HEADROOM * max(1, highest))
+        ax.set_ylim(0, _HEADROOM * max(highest))
         ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5, steps=[1, 2, 5, 10]))
 
 
 def _legend(figure: Figure, grid: FigureGrid) -> None:
     """Below the panels, for what is not said in them: stages and failed steps."""
-    handles: dict[str, Line2D] = {}
-    runs = [run for _, _, run in grid.cells() if run]
-    if any(run.stages > 1 for run in runs):
+    handles: dict[str, Any] = {}
+    if any(run.stages > 1 for _, _, run in grid.cells() if run):
         lines = next(ax for ax in figure.axes if len(ax.lines) > 1).lines
         handles |= {"first stage": lines[0], "second stage": lines[1]}
-    for ax in figure.axes:
-        marks = [line for line in ax.lines if line.get_gid() == "failed"]
-        handles |= {f"did not converge ({_mark_name(line.get_marker())})": line for line in marks}
+    marks = {line.get_marker(): line for ax in figure.axes for line in ax.lines if line.get_gid() == "failed"}
+    if marks:
+        handles["did not converge"] = tuple(marks.values())
     if handles:
-        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=len(handles), fontsize=9)
-
-
-def _mark_name(marker: object) -> str:
-    return "rug at the foot" if marker == "|" else "cross"
+        figure.legend(
+            list(handles.values()),
+            list(handles),
+            loc="outside lower center",
+            ncols=len(handles),
+            fontsize=9,
+            handler_map={tuple: HandlerTuple(ndivide=None)},
+        )

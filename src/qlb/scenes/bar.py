@@ -61,10 +61,10 @@ class BarScene(Scene):
         """Material and fibres, for the variants of the paper's figures 3 and 4 (the numbers are ours)."""
         arguments: dict[str, Any] = {}
         if self.heterogeneous:
-            x = mesh.positions[mesh.tets].mean(axis=1)[:, 0]
+            x = mesh.centroids()[:, 0]
             slab = np.floor(8 * (x - mesh.positions[:, 0].min()) / np.ptp(mesh.positions[:, 0]))
-            young = np.where(slab % 2 == 1, 10.0, 1.0) * self.material.young
+            young = np.where(slab % 2 == 1, 10.0, 1.0) * self.material.on(mesh).young
             arguments["material"] = self.material.model_copy(update={"young": young})
         if self.anisotropic and self.fibres is None:
-            arguments["fibres"] = (Fibres(modulus=2 * self.material.young, direction=(1.0, 1.0, 0.0)),)
+            arguments["fibres"] = (Fibres(modulus=2 * self.material.on(mesh).young, direction=(1.0, 1.0, 0.0)),)
         return arguments

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from qlb.errors import InputError
 from qlb.scenes.scene import Scene
-from qlb.settings import describe_range, key_fields, unknown_key
+from qlb.settings import describe_range, key_fields, plain, unknown_key
 
 
 def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:
@@ -70,13 +70,26 @@ def _override(kind: type[Scene], data: dict[str, Any], override: str) -> None:
 
 
 def _value(text: str) -> Any:
-    """A value as YAML reads it; "1,2,3" is a list."""
+    """A value as YAML reads it; "1,2,3" is a list, and "where(x < 1, 2, 3)" is not."""
+    parts = _split(text)
+    if len(parts) > 1:
+        return [_value(part) for part in parts]
     try:
-        if "," in text and not text.lstrip().startswith("["):
-            return [_value(part) for part in text.split(",")]
         return yaml.safe_load(text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2001-99-99 is a ValueError
         return text
+
+
+def _split(text: str) -> list[str]:
+    """The parts of `text` between commas, other than commas inside brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([{") - (character in ")]}")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
 
 
 def scene_yaml(scene: Scene) -> str:
@@ -112,8 +125,7 @@ def _plain(value: Any) -> str:
     """One line of YAML for a leaf value."""
     if value is None:
         return "null"
-    if hasattr(value, "tolist"):
-        value = value.tolist()
+    value = plain(value)
     if isinstance(value, tuple):
         value = list(value)
     if isinstance(value, Path):

@@ -45,13 +45,15 @@ class StageProblem:
 
     @property
     def residual_rounding(self) -> float:
-        """What rounding of the positions leaves of |g|: some eps of the mass times the largest coordinate."""
-        return 1e-15 * self._mass_scale * self.system.norm(self.system.mass) * float(np.abs(self.start).max())
+        """What rounding of the positions leaves of |g|: some eps of mass and stiffness times the largest coordinate."""
+        system, extent = self.system, float(np.abs(self.start).max())
+        inertia, elasticity = self._mass_scale * system.norm(system.mass), self.force_scale * system.norm(system.spring)
+        return 1e-15 * extent * (inertia + elasticity)
 
     @property
     def energy_rounding(self) -> float:
-        """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e E_e V_e."""
-        return 4e-15 * self.force_scale * self.system.energy_scale
+        """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e (lambda + 2 mu)_e V_e."""
+        return 1e-15 * self.force_scale * self.system.energy_scale
 
     def value_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
         """E and its gradient at positions `x` [m]: kg m^2 and kg m (J and N in quasistatics), gradient (n, 3)."""

@@ -30,7 +30,8 @@ class System:
         inertia: 1/2 |x - target|_M^2.
         mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
-        energy_scale: sum of E_e V_e over the elements [J].
+        spring: (lambda + 2 mu)_i V_i^(1/3) of each node [N/m], about a tenth of its diagonal stiffness, shape (n,).
+        energy_scale: sum of (lambda + 2 mu)_e V_e over the elements [J].
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class System:
         self.threads = threads
         self.pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
         blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
+        material = material.on(mesh)
         parameters = material.parameter_table(len(mesh.tets))
         self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
         self.potentials: list[Potential] = [
@@ -64,8 +66,10 @@ class System:
         self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
         self.terms: list[Term] = [self.gravity]
         modulus = per_element(material, material.modulus(), len(mesh.tets))
-        self.stiffness = _node_stiffness(mesh, modulus)
-        self.energy_scale = float(modulus @ mesh.volumes())
+        stiffest = per_element(material, material.wave_modulus(), len(mesh.tets))
+        self.stiffness = _node_stiffness(mesh, modulus, 2 / 3)
+        self.spring = _node_stiffness(mesh, stiffest, 1 / 3)
+        self.energy_scale = float(stiffest @ mesh.volumes())
         self._fixed = np.flatnonzero(held.fixed.ravel())
 
     @property
@@ -113,8 +117,9 @@ def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tupl
     return row_begin.astype(np.int64), (entries % n).astype(np.int32), values
 
 
-def _node_stiffness(mesh: TetMesh, modulus: FloatArray) -> FloatArray:
+def _node_stiffness(mesh: TetMesh, modulus: FloatArray, power: float) -> FloatArray:
+    """E_i V_i^power of each node, from means over its elements, shape (n,)."""
     nodes, share = mesh.tets.ravel(), np.repeat(mesh.volumes() / 4, 4)
     volume = np.bincount(nodes, weights=share, minlength=len(mesh.positions))
     stiffness = np.bincount(nodes, weights=share * np.repeat(modulus, 4), minlength=len(mesh.positions))
-    return np.asarray(stiffness / volume ** (1 / 3))
+    return np.asarray(stiffness * volume ** (power - 1))
