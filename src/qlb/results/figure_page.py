@@ -8,7 +8,7 @@ from pathlib import Path
 
 from qlb.results.figure import FigureGrid
 from qlb.results.files import write_text
-from qlb.results.report import Verdict, _common, _data_uri, _template, flatten
+from qlb.results.report import Verdict, common, data_uri, flatten, template
 from qlb.results.run import Run
 
 PAGE = "index.html"
@@ -78,11 +78,11 @@ def write_figures_page(
         "problems": problems,
         "notes": notes,
         "figures": [_figure(grid, directory) for grid in grids],
-        "settings": _common([flatten(run.scene) for run in runs]) if runs else {},
-        "versions": _common([run.summary["versions"] for run in runs]) if runs else {},
+        "settings": common([flatten(run.scene) for run in runs]) if runs else {},
+        "versions": common([run.summary["versions"] for run in runs]) if runs else {},
     }
     path = directory / PAGE
-    write_text(path, _template("figures.html.j2").render(context))
+    write_text(path, template("figures.html.j2").render(context))
     return path
 
 
@@ -92,7 +92,7 @@ def _figure(grid: FigureGrid, directory: Path) -> dict[str, object]:
         "number": grid.number,
         "title": grid.title,
         "parameter": grid.parameter,
-        "image": _data_uri(directory / f"figure-{grid.number}.png"),
+        "image": data_uri(directory / f"figure-{grid.number}.png"),
         "alt": f"Nonlinear iterations over time steps of {', '.join(grid.solvers)}; rows: {', '.join(grid.runs)}",
         "expectation": grid.expectation,
         "groups": [[row for row in rows if row.row == label] for label in grid.runs],

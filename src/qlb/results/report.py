@@ -101,7 +101,7 @@ def write_report(run: Run, missing: Mapping[str, str] | None = None) -> Path:
         "versions": s["versions"],
         "files": [layout.STATS, layout.SUMMARY, layout.SCENE],
     }
-    write_text(path, _template("report.html.j2").render(context))
+    write_text(path, template("report.html.j2").render(context))
     return path
 
 
@@ -129,12 +129,12 @@ def write_comparison(runs: Mapping[str, Run], rows: Sequence[Mapping[str, object
         "verdict": _verdict_of_all(runs),
         "columns": [_COLUMNS.get(name, name.replace("_", " ")) for name in names],
         "rows": [_table_row(row, runs, directory) for row in rows],
-        "image": {"title": _TITLES["iterations"], "alt": _ALT["iterations"], "data": _data_uri(plot)},
-        "settings": _common([flatten(run.scene) for run in runs.values()]),
-        "versions": _common([run.summary["versions"] for run in runs.values()]),
+        "image": {"title": _TITLES["iterations"], "alt": _ALT["iterations"], "data": data_uri(plot)},
+        "settings": common([flatten(run.scene) for run in runs.values()]),
+        "versions": common([run.summary["versions"] for run in runs.values()]),
     }
     path = directory / layout.REPORT
-    write_text(path, _template("comparison.html.j2").render(context))
+    write_text(path, template("comparison.html.j2").render(context))
     return path
 
 
@@ -244,7 +244,8 @@ def _short(value: object) -> str:
     return text if len(text) <= 400 else text[:397] + "..."
 
 
-def _common(tables: Sequence[Mapping[str, str]]) -> dict[str, str]:
+def common(tables: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """What all tables say alike."""
     first, *others = tables
     return {key: value for key, value in first.items() if all(t.get(key) == value for t in others)}
 
@@ -267,7 +268,7 @@ def _images(run: Run, missing: Mapping[str, str]) -> list[dict[str, str | None]]
             "name": name,
             "title": _TITLES[name],
             "alt": _ALT[name],
-            "data": _data_uri(path) if path.exists() else None,
+            "data": data_uri(path) if path.exists() else None,
             "missing": missing.get(name),
         }
         for name, path in paths.items()
@@ -275,7 +276,8 @@ def _images(run: Run, missing: Mapping[str, str]) -> list[dict[str, str | None]]
     ]
 
 
-def _data_uri(path: Path) -> str:
+def data_uri(path: Path) -> str:
+    """An image as a data URI, to stand in the page itself."""
     return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
 
 
@@ -287,5 +289,6 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _template(name: str) -> jinja2.Template:
+def template(name: str) -> jinja2.Template:
+    """A page template by its file name."""
     return _environment().get_template(name)

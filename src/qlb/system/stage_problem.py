@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from qlb import _native
@@ -38,19 +40,19 @@ class StageProblem:
         """What forces are multiplied by in g: c^2, or 1 in quasistatics."""
         return self.stage.c**2 if self.stage.inertial else 1.0
 
-    @property
+    @cached_property
     def residual_scale(self) -> float:
         """|c^2 E_i V_i^(2/3)| over the nodes: the residual of a strain of order one (after Zhu et al. 2018)."""
         return self.force_scale * self.system.norm(self.system.stiffness)
 
-    @property
+    @cached_property
     def residual_rounding(self) -> float:
         """What rounding of the positions leaves of |g|: some eps of mass and stiffness times the largest coordinate."""
         system, extent = self.system, float(np.abs(self.start).max())
         inertia, elasticity = self._mass_scale * system.norm(system.mass), self.force_scale * system.norm(system.spring)
         return 1e-15 * extent * (inertia + elasticity)
 
-    @property
+    @cached_property
     def energy_rounding(self) -> float:
         """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e (lambda + 2 mu)_e V_e."""
         return 1e-15 * self.force_scale * self.system.energy_scale
