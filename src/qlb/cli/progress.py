@@ -74,9 +74,10 @@ class StepReporter:
 
 
 class Interrupt:
-    """Turns Ctrl-C (and SIGTERM) into a wish to stop after the current step; a second one stops at once."""
+    """Turns Ctrl-C (and SIGTERM) into a wish to stop at a good moment; a second one stops at once."""
 
-    def __init__(self) -> None:
+    def __init__(self, notice: str = "Stopping after this step; what is done is kept.") -> None:
+        self._notice = notice
         self._wanted = False
         self._old: dict[signal.Signals, object] = {}
 
@@ -88,7 +89,7 @@ class Interrupt:
         if self._wanted:
             raise KeyboardInterrupt
         self._wanted = True
-        errors.print("Stopping after this step; what is done is kept. Once more to stop at once.")
+        errors.print(f"{self._notice} Once more to stop at once.")
 
     def __enter__(self) -> Self:
         """Listen to the signals."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Self
 
 from rich.markup import escape
@@ -13,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from qlb.cli.output import console, errors
+from qlb.cli.progress import Interrupt
 from qlb.results import FigureRow, Run, figure_rows
 from qlb.simulation import available_threads
 from qlb.studies import Case, Plan, Reproduction, Update, chosen_figures, plan_figures, reproduce
@@ -25,7 +25,7 @@ def reproduce_figures(
 ) -> int:
     """Redraw figures and print their tables; the exit status: 0 all there, 1 a case crashed, 130 interrupted."""
     plan = plan_figures(chosen_figures(names), overrides, out)
-    with _Stop() as stop, CaseReporter(plan) as reporter:
+    with Interrupt("Stopping; the cases that are complete are kept.") as stop, CaseReporter(plan) as reporter:
         result = reproduce(
             plan,
             processes=available_threads() if processes is None else processes,
@@ -114,36 +114,6 @@ class CaseReporter:
     ) -> None:
         """Leave the terminal as it was."""
         self._progress.stop()
-
-
-class _Stop:
-    """Turns Ctrl-C (and SIGTERM) into a wish to stop; a second one stops at once."""
-
-    def __init__(self) -> None:
-        self._wanted = False
-        self._old: dict[signal.Signals, object] = {}
-
-    def __call__(self) -> bool:
-        """Whether to stop."""
-        return self._wanted
-
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        if self._wanted:
-            raise KeyboardInterrupt
-        self._wanted = True
-
-    def __enter__(self) -> Self:
-        """Listen to the signals."""
-        for name in (signal.SIGINT, signal.SIGTERM):
-            self._old[name] = signal.signal(name, self._on_signal)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Give the signals back."""
-        for name, handler in self._old.items():
-            signal.signal(name, handler)  # type: ignore[arg-type]
 
 
 def _print_tables(result: Reproduction) -> None:
