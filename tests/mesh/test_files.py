@@ -127,3 +127,15 @@ def test_a_file_cut_short_is_refused(tmp_path: Path, mesh: TetMesh, form: str, s
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(InputError):
         TetMesh.read(path)
+
+
+SHARED = Path(__file__).parents[3] / "shared" / "meshes"
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs the meshes of shared/, which are not part of the project")
+@pytest.mark.parametrize(("name", "tets"), [("bunny5K.msh", 19379), ("armadillo13K.msh", 54985)])
+def test_meshes_of_the_ipc_authors_are_read_without_a_word(
+    name: str, tets: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert len(TetMesh.read(SHARED / name).tets) == tets
+    assert capfd.readouterr() == ("", "")

@@ -34,7 +34,8 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     failed = summary["failed_steps"]
     which = ", ".join(map(str, failed[:8])) + (", ..." if len(failed) > 8 else "")
     reason = f"\n{escape(summary['error'])}" if summary.get("error") else ""
-    return f"[red]not converged[/] in {len(failed)} steps ({which}): {counts}{reason}"
+    steps = f"{len(failed)} step{'s' if len(failed) > 1 else ''}"
+    return f"[red]not converged[/] in {steps} ({which}): {counts}{reason}"
 
 
 def print_comparison(rows: Sequence[Mapping[str, Any]], report: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,8 @@ def read_tets(path: Path) -> tuple[FloatArray, IntArray, LongArray | None]:
     if path.stat().st_size == 0:
         raise InputError(f"mesh file {path} is empty")
     try:
-        data = meshio.read(path)
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # its readers print
+            data = meshio.read(path)
     except (Exception, SystemExit) as error:  # its readers raise whatever they stumble over
         reason = str(error).strip().splitlines()
         raise InputError(f"mesh file {path} cannot be read: {reason[0] if reason else type(error).__name__}") from None
