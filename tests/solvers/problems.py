@@ -61,6 +61,7 @@ class WrongGradient(StageProblem):
 class NoPrediction(StageProblem):
     """Its predictor gives nothing usable."""
 
+    @property
     def predictor(self) -> Array:
         return np.full_like(self.start, np.nan)
 

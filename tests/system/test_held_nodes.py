@@ -126,14 +126,6 @@ def test_placing_leaves_its_argument_alone(mesh: TetMesh) -> None:
     np.testing.assert_array_equal(x, mesh.positions)
 
 
-def test_moving_tells_scripts_from_pins(mesh: TetMesh) -> None:
-    held = HeldNodes(len(mesh.positions))
-    held.hold([0], mesh.positions)
-    assert not held.moving
-    held.hold([1], mesh.positions, Translation((1.0, 0.0, 0.0)))
-    assert held.moving
-
-
 @pytest.mark.parametrize(
     ("nodes", "axes", "message"),
     [

@@ -172,14 +172,14 @@ def test_predictor_goes_on_with_velocity_and_acceleration(case: Case) -> None:
     expected = state.positions + t * state.velocities
     if case.stage.inertial:
         expected += t**2 / 2 * (state.velocities - state.previous.velocities) / H  # type: ignore[union-attr]
-    guess = case.problem.predictor()
+    guess = case.problem.predictor
     np.testing.assert_allclose(guess[case.free], expected[case.free], rtol=1e-13)
     np.testing.assert_array_equal(guess[~case.free], case.problem.start[~case.free])
 
 
 def test_predictor_without_an_earlier_state_uses_the_velocity(case: Case) -> None:
     state = case.state.without_history()
-    guess = StageProblem(case.system, case.stage, state, Timer()).predictor()
+    guess = StageProblem(case.system, case.stage, state, Timer()).predictor
     expected = state.positions + (case.stage.time - state.time) * state.velocities
     np.testing.assert_allclose(guess[case.free], expected[case.free], rtol=1e-14)
 

@@ -84,7 +84,7 @@ class Descent(ABC):
     def _initial_point(self, problem: StageProblem) -> Point:
         """x_k, or the predictor where it is asked for and its energy is finite."""
         if self.settings.initial_guess == "predictor":
-            guess = Point.at(problem, problem.predictor())
+            guess = Point.at(problem, problem.predictor)
             if guess.is_finite:
                 return guess
         return Point.at(problem, problem.start)

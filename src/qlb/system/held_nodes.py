@@ -110,8 +110,3 @@ class HeldNodes:
         for group in self._groups:
             placed[np.ix_(group.nodes, group.axes)] = group.positions(time)[:, group.axes]
         return placed
-
-    @property
-    def moving(self) -> bool:
-        """Whether any node is moved by a script."""
-        return any(group.motion is not None for group in self._groups)

@@ -31,8 +31,7 @@ class StageProblem:
         """x_k [m] with the held nodes where they are at the stage's time, shape (n, 3)."""
         self._mass_scale = 1.0 + stage.c * system.mass_damping if stage.inertial else 0.0
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
-        guess = self.predictor()
-        self._potentials = [*system.potentials, *(term.at(stage, guess) for term in system.terms)]
+        self._potentials = [*system.potentials, *(term.at(stage, self.predictor) for term in system.terms)]
         self._hessian: _native.BlockMatrix | None = None
 
     @property
@@ -83,6 +82,7 @@ class StageProblem:
                 system.inertia.add_hessian(self._mass_scale, self._hessian)
             return self._hessian
 
+    @cached_property
     def predictor(self) -> FloatArray:
         """x_k + t v_k + t^2/2 (v_k - v_{k-1})/h, t the stage's time into the step; held nodes exact.
 
