@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qlb import Simulation, SolverSettings, StableNeoHookean, State, TetMesh, Tolerance, _native
+from qlb import Damping, Energy, Simulation, SolverSettings, StableNeoHookean, State, TetMesh, Tolerance, _native
 from qlb.system import HeldNodes, System
 
 Array = NDArray[np.float64]
@@ -63,7 +63,8 @@ def make_system(
     *,
     gravity: object = (0.0, -9.81, 0.0),
     mass: str = "lumped",
-    mass_damping: float = 0.0,
+    damping: Damping | None = None,
+    energies: Sequence[Energy] = (),
     held: HeldNodes | None = None,
     threads: int = 1,
 ) -> System:
@@ -72,7 +73,8 @@ def make_system(
         material or StableNeoHookean(),
         gravity=gravity,  # type: ignore[arg-type]
         mass=mass,  # type: ignore[arg-type]
-        mass_damping=mass_damping,
+        damping=damping or Damping(),
+        energies=energies,
         held=held or HeldNodes(len(mesh.positions)),
         threads=threads,
     )

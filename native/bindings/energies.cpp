@@ -5,6 +5,7 @@
 #include "elements/dispatch.hpp"
 #include "elements/elastic_energy.hpp"
 #include "energies/inertia.hpp"
+#include "energies/viscosity.hpp"
 
 namespace qlb {
 namespace {
@@ -74,6 +75,21 @@ void bind_energies(nb::module_& m) {
             e.add_hessian(sized(x, 3 * e.nodes(), "x"), scale, project, matrix);
           },
           nb::arg("x"), nb::arg("scale"), nb::arg("project"), nb::arg("matrix"), ReleaseGil());
+
+  nb::class_<Viscosity, ElasticEnergy>(m, "Viscosity", "Kelvin-Voigt viscosity as a potential of one stage.")
+      .def(
+          "__init__",
+          [](Viscosity* self, std::shared_ptr<TetBlocks> blocks, const Array<const double>& eta, int threads) {
+            new (self) Viscosity(std::move(blocks), view(eta), threads);
+          },
+          nb::arg("blocks"), nb::arg("eta"), nb::arg("threads"))
+      .def("clear_base", &Viscosity::clear_base, nb::arg("c"), ReleaseGil())
+      .def(
+          "add_base",
+          [](Viscosity& e, double weight, const Array<const double>& x) {
+            e.add_base(weight, sized(x, 3 * e.nodes(), "x"));
+          },
+          nb::arg("weight"), nb::arg("x"), ReleaseGil());
 
   nb::class_<Inertia>(m, "Inertia")
       .def(

@@ -24,6 +24,9 @@ class ElasticEnergy {
 
   std::int64_t nodes() const { return blocks_->nodes; }
 
+ protected:
+  double* parameters() { return parameters_.data(); }  // (packs, count, kLanes)
+
  private:
   ChunkData chunk_data(const Chunk& chunk) const;
   // kernel(chunk, data, scratch) over all chunks in parallel.

@@ -7,6 +7,7 @@ from importlib.metadata import version as _version
 # before the OpenMP runtime is loaded; a value that the user has set wins.
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
+from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
 from qlb.errors import InputError, QlbError
 from qlb.integrators import State
 from qlb.materials import (
@@ -29,11 +30,16 @@ __version__ = _version("qlb")
 __all__ = [
     "Arap",
     "CompressibleNeoHookean",
+    "Damping",
+    "Energy",
     "Fibres",
     "FixedCorotational",
     "InputError",
     "LinearElastic",
     "MooneyRivlin",
+    "NodalEnergy",
+    "PointForce",
+    "Pressure",
     "QlbError",
     "Reason",
     "Rotation",
@@ -42,10 +48,12 @@ __all__ = [
     "StVenantKirchhoff",
     "StableNeoHookean",
     "State",
+    "StencilEnergy",
     "StepFailed",
     "StepResult",
     "TetMesh",
     "Tolerance",
+    "Traction",
     "Translation",
     "__version__",
 ]

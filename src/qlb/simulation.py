@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from qlb.arrays import FloatArray, vectors
+from qlb.energies import Acceleration, Damping, Energy
 from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS, Integrator, State
 from qlb.materials import Fibres, Material
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
-from qlb.system import Acceleration, HeldNodes, Motion, StageProblem, System
+from qlb.system import HeldNodes, Motion, StageProblem, System
 from qlb.system.system import MassKind
 from qlb.timing import Timer
 
@@ -89,7 +90,7 @@ class Simulation:
         gravity: acceleration [m/s^2], shape (3,), or a function of time [s] that gives it.
         velocity: initial velocity [m/s], shape (3,) or (n, 3).
         mass: "lumped" or "consistent".
-        mass_damping: Rayleigh's alpha [1/s], >= 0: a force -alpha M v.
+        damping: Rayleigh's two kinds and Kelvin-Voigt viscosity; none by default.
         tolerance: when a solve has converged.
         solver_settings: settings of the solver.
         on_failure: what to do about a step that does not converge: "stop" raises `StepFailed`; "halve" takes it in two
@@ -113,7 +114,7 @@ class Simulation:
         gravity: Acceleration = (0.0, -9.81, 0.0),
         velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
         mass: MassKind = "lumped",
-        mass_damping: float = 0.0,
+        damping: Damping | None = None,
         tolerance: Tolerance | None = None,
         solver_settings: SolverSettings | None = None,
         on_failure: OnFailure = "stop",
@@ -122,7 +123,7 @@ class Simulation:
         self._integrator = _choose("integrator", integrator, INTEGRATORS)()
         self._solver_class = _choose("solver", solver, SOLVERS)
         _require("step", step, "> 0 s", _is_number(step) and step > 0)
-        _require("mass_damping", mass_damping, ">= 0 1/s", _is_number(mass_damping) and mass_damping >= 0)
+        _require("damping", damping, "a Damping", isinstance(damping, Damping | None))
         _require("mass", mass, "'lumped' or 'consistent'", mass in ("lumped", "consistent"))
         _require("on_failure", on_failure, "'stop', 'halve' or 'accept'", on_failure in ("stop", "halve", "accept"))
         _require("threads", threads, ">= 1", threads is None or (isinstance(threads, int) and threads >= 1))
@@ -136,7 +137,7 @@ class Simulation:
         self.step = float(step)
         self.gravity = gravity if callable(gravity) else tuple(vectors("gravity", gravity, (3,)))
         self.mass: MassKind = mass
-        self.mass_damping = float(mass_damping)
+        self.damping = damping or Damping()
         self.tolerance = tolerance or Tolerance()
         self.solver_settings = solver_settings or SolverSettings()
         self.on_failure: OnFailure = on_failure
@@ -144,6 +145,7 @@ class Simulation:
         self.timer = Timer()
         """Wall-clock seconds by part, from the first step on."""
         self._held = HeldNodes(len(mesh.positions))
+        self._energies: list[Energy] = []
         self._steps_done = 0
         self._state = State(0.0, mesh.positions, vectors("velocity", velocity, mesh.positions.shape))
         self._system: System | None = None
@@ -154,10 +156,23 @@ class Simulation:
         self._before_first_step("pin nodes")
         self._held.hold(nodes, self._state.positions, axes=axes)
 
-    def move(self, nodes: npt.ArrayLike, motion: Motion) -> None:
-        """Move nodes by a script: motion(positions at time 0 (k, 3), time [s]) -> positions (k, 3) [m]."""
+    def move(self, nodes: npt.ArrayLike, motion: Motion, axes: str = "xyz") -> None:
+        """Move nodes by a script, in all or some directions: `Translation`, `Rotation`, `Keyframes` or any function
+        motion(positions at time 0 (k, 3), time [s]) -> positions (k, 3) [m]. Raises `InputError` as `pin` does.
+        """
         self._before_first_step("move nodes")
-        self._held.hold(nodes, self._state.positions, motion)
+        self._held.hold(nodes, self._state.positions, motion, axes)
+
+    def add(self, energy: Energy) -> None:
+        """Add a load (`PointForce`, `Traction`, `Pressure`) or an energy of your own (`StencilEnergy`, `NodalEnergy`).
+
+        Raises:
+            InputError: it does not fit the mesh; the message names what does not.
+        """
+        self._before_first_step("add energies")
+        _require("energy", energy, "an Energy", isinstance(energy, Energy))
+        energy.node_sets(self.mesh)
+        self._energies.append(energy)
 
     def _before_first_step(self, what: str) -> None:
         if self._system is not None:
@@ -188,7 +203,8 @@ class Simulation:
                 fibres=self.fibres,
                 gravity=self.gravity,
                 mass=self.mass,
-                mass_damping=self.mass_damping,
+                damping=self.damping,
+                energies=self._energies,
                 held=self._held,
                 threads=self.threads,
             )
@@ -246,7 +262,7 @@ class Simulation:
         stages = integrator.step(state, h)
         stage = next(stages)
         while True:
-            solve = solver.minimise(StageProblem(self.system, stage, state, self.timer))
+            solve = solver.solve(StageProblem(self.system, stage, state, self.timer))
             solves.append(solve)
             if not solve.reason.converged and self.on_failure != "accept":
                 return State(state.time + h, solve.positions, stage.velocity(solve.positions)), solves

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from qlb import Simulation, StableNeoHookean, State, Tolerance
+from qlb import Damping, Simulation, StableNeoHookean, State, Tolerance
 from tests.support import ROBUST_NEWTON, TIGHT, Array, finish, fitted_slope, left_end, right_end, small_bar, start_at
 
 SOFT = StableNeoHookean(young=1e3, poisson=0.3)
@@ -26,18 +26,22 @@ REFERENCE = 3200
 @dataclass(frozen=True)
 class Scenario:
     mass: str = "lumped"
-    mass_damping: float = 0.0
+    damping: Damping | None = None
     loaded: bool = False
     scripted: bool = False
 
 
 SCENARIOS = {
     "released": Scenario(),
-    "released, damped": Scenario(mass_damping=5.0),
+    "released, damped": Scenario(damping=Damping(mass=5.0)),
+    "released, viscous": Scenario(damping=Damping(viscosity=20.0)),
+    "released, stiffness damping": Scenario(damping=Damping(stiffness=0.02)),
     "released, consistent mass": Scenario(mass="consistent"),
     "loaded in time": Scenario(loaded=True),
     "scripted": Scenario(scripted=True),
-    "scripted, damped": Scenario(scripted=True, mass_damping=5.0),
+    "scripted, damped": Scenario(scripted=True, damping=Damping(mass=5.0)),
+    "scripted, viscous": Scenario(scripted=True, damping=Damping(viscosity=20.0)),
+    "scripted, stiffness damping": Scenario(scripted=True, damping=Damping(stiffness=0.02)),
     "scripted, consistent mass": Scenario(scripted=True, mass="consistent"),
 }
 
@@ -73,7 +77,7 @@ def end_of(scenario: Scenario, integrator: str, count: int) -> State:
         step=TIME / count,
         gravity=load if scenario.loaded else (0.0, 0.0, 0.0),
         mass=scenario.mass,  # type: ignore[arg-type]
-        mass_damping=scenario.mass_damping,
+        damping=scenario.damping,
         tolerance=tolerance,
         solver_settings=ROBUST_NEWTON,
         threads=1,

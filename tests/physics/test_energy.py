@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from qlb import Simulation, StableNeoHookean, TetMesh, Tolerance
+from qlb import Damping, Simulation, StableNeoHookean, TetMesh, Tolerance
 from tests.support import Array, left_end, mechanical_energy
 
 STEPS = 150
@@ -57,7 +57,7 @@ def test_energy_is_never_gained(integrator: str) -> None:
 
 
 def test_damping_takes_energy() -> None:
-    free, damped = swinging("SDIRK2"), swinging("SDIRK2", mass_damping=2.0)
+    free, damped = swinging("SDIRK2"), swinging("SDIRK2", damping=Damping(mass=2.0))
     for simulation in (free, damped):
         for _ in simulation.run(50):
             pass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qlb import Simulation, StableNeoHookean, TetMesh, Tolerance
+from qlb import Damping, Simulation, StableNeoHookean, TetMesh, Tolerance
 from tests.support import ROBUST_NEWTON, TIGHT, Array, finish, fitted_slope, start_at
 
 MESH = TetMesh.box((0.6, 0.3, 0.2), cells=(3, 2, 1))
@@ -122,7 +122,7 @@ def test_mass_damping_slows_a_drifting_body(integrator: str, factor: object) -> 
         step=h,
         gravity=(0.0, 0.0, 0.0),
         velocity=tuple(DRIFT),
-        mass_damping=alpha,
+        damping=Damping(mass=alpha),
         tolerance=Tolerance(relative=1e-9),
         threads=1,
     )

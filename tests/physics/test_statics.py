@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from qlb import Simulation, StableNeoHookean, State, TetMesh, Tolerance
+from qlb import Damping, Simulation, StableNeoHookean, State, TetMesh, Tolerance
 from qlb.integrators import INTEGRATORS
 from qlb.solvers import SOLVERS
 from qlb.system import HeldNodes, StageProblem
@@ -186,7 +186,7 @@ def test_a_damped_motion_ends_in_the_static_equilibrium(integrator: str, damping
     static = hanging("quasistatic", step=1.0)
     static.advance()
     assert np.abs(static.state.positions - static.mesh.positions).max() > 0.5
-    moving = hanging(integrator, step=0.5, mass_damping=damping)
+    moving = hanging(integrator, step=0.5, damping=Damping(mass=damping))
     finish(moving, 40)
     np.testing.assert_allclose(moving.state.positions, static.state.positions, rtol=0, atol=1e-6)
 
@@ -214,5 +214,5 @@ def test_reactions_carry_the_weight() -> None:
 
 
 def test_quasistatics_knows_no_mass_damping() -> None:
-    ends = [finish(hanging("quasistatic", step=1.0, mass_damping=alpha), 1).positions for alpha in (0.0, 50.0)]
+    ends = [finish(hanging("quasistatic", step=1.0, damping=Damping(mass=alpha)), 1).positions for alpha in (0.0, 50.0)]
     np.testing.assert_array_equal(ends[0], ends[1])

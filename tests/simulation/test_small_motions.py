@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qlb import Simulation, SolverSettings, StableNeoHookean, TetMesh
+from qlb import Damping, Simulation, SolverSettings, StableNeoHookean, TetMesh
 from tests.support import Array, left_end, right_end
 
 MESH = TetMesh.box((0.75, 0.25, 0.25), cells=(8, 3, 3))
@@ -56,7 +56,7 @@ def test_a_tiny_load_moves_the_bar_in_proportion(gravity: float, integrator: str
 
 @pytest.mark.parametrize("solver", ["ND", "QLB"])
 def test_a_bar_that_has_come_to_rest_stays_there(solver: str) -> None:
-    simulation = bar(integrator="BDF1", solver=solver, step=0.5, mass_damping=20.0)
+    simulation = bar(integrator="BDF1", solver=solver, step=0.5, damping=Damping(mass=20.0))
     for _ in simulation.run(30):
         pass
     resting = simulation.state.positions

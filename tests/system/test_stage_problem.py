@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from qlb import StableNeoHookean, State, TetMesh, Translation
+from qlb import Damping, StableNeoHookean, State, TetMesh, Translation
 from qlb.integrators import INTEGRATORS, Stage
 from qlb.system import HeldNodes, StageProblem, System
 from qlb.timing import Timer
@@ -69,7 +69,7 @@ def case(request: pytest.FixtureRequest, mass: str, damping: float, rng: np.rand
     held.hold([0, 3, 4], mesh.positions)
     held.hold([7, 8], mesh.positions, Translation((0.1, 0.2, 0.3)))
     held.hold([11], mesh.positions, axes="y")
-    system = make_system(mesh, gravity=tuple(GRAVITY), mass=mass, mass_damping=damping, held=held)
+    system = make_system(mesh, gravity=tuple(GRAVITY), mass=mass, damping=Damping(mass=damping), held=held)
     state = moving_state(mesh, rng)
     stage = stage_of(*request.param, state, rng)
     problem = StageProblem(system, stage, state, Timer())
@@ -117,7 +117,7 @@ def test_gradient_is_that_of_the_supplement(case: Case) -> None:
     expected = -force
     if stage.inertial:
         v = (x - stage.x_b) / stage.c
-        damping = -system.mass_damping * case.M @ v
+        damping = -system.damping.mass * case.M @ v
         expected = case.M @ (x - stage.x_b - stage.c * stage.v_b) - stage.c**2 * (force + damping)
     gradient = case.problem.value_gradient(x)[1]
     np.testing.assert_allclose(gradient[case.free], expected[case.free], rtol=0, atol=1e-12 * np.abs(expected).max())
@@ -135,7 +135,7 @@ def test_value_is_the_documented_energy_up_to_a_constant(case: Case, rng: np.ran
         if not stage.inertial:
             return potential
         kinetic = 0.5 * square(x - stage.x_b - stage.c * stage.v_b)
-        return kinetic + stage.c**2 * potential + 0.5 * stage.c * system.mass_damping * square(x - stage.x_b)
+        return kinetic + stage.c**2 * potential + 0.5 * stage.c * system.damping.mass * square(x - stage.x_b)
 
     other = case.x + 0.01 * rng.normal(size=case.x.shape)
     values = [case.problem.value_gradient(y)[0] for y in (case.x, other)]

@@ -13,7 +13,7 @@ class BDF1(Integrator):
 
     def step(self, state: State, h: float) -> Steps:
         """One stage: c = h, x_b = x_k, v_b = v_k."""
-        stage = Stage(state.time + h, h, state.positions, state.velocities)
+        stage = Stage(state.time + h, h, ((1.0, state.positions),), state.velocities)
         x = yield stage
         return x, stage.velocity(x)
 
@@ -31,9 +31,9 @@ class BDF2(Integrator):
         if state.previous is None:
             return (yield from self.one_step_method().step(state, h))
         last = state.previous
-        x_b = (4 * state.positions - last.positions) / 3
+        base = ((4 / 3, state.positions), (-1 / 3, last.positions))
         v_b = (4 * state.velocities - last.velocities) / 3
-        stage = Stage(state.time + h, 2 * h / 3, x_b, v_b)
+        stage = Stage(state.time + h, 2 * h / 3, base, v_b)
         x = yield stage
         return x, stage.velocity(x)
 

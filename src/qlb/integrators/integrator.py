@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import cached_property
 
 from qlb.arrays import FloatArray
 
@@ -34,12 +35,21 @@ class Stage:
     """Where the loads and the held nodes are taken [s]."""
     c: float
     """[s]"""
-    x_b: FloatArray
-    """[m], shape (n, 3)"""
+    base: tuple[tuple[float, FloatArray], ...]
+    """x_b as a combination of positions that were: weights, and positions [m] of shape (n, 3)."""
     v_b: FloatArray
     """[m/s], shape (n, 3)"""
     inertial: bool = True
     """False in quasistatics, where the stage is f(x) = 0."""
+
+    @cached_property
+    def x_b(self) -> FloatArray:
+        """[m], shape (n, 3)"""
+        weight, first = self.base[0]
+        x_b = first if weight == 1 else weight * first
+        for weight, positions in self.base[1:]:
+            x_b = x_b + weight * positions
+        return x_b
 
     def velocity(self, x: FloatArray) -> FloatArray:
         """v = (x - x_b)/c [m/s]."""

@@ -12,6 +12,6 @@ class Quasistatic(Integrator):
 
     def step(self, state: State, h: float) -> Steps:
         """One stage without inertia; the velocity returned is the mean over the step."""
-        stage = Stage(state.time + h, h, state.positions, state.velocities, inertial=False)
+        stage = Stage(state.time + h, h, ((1.0, state.positions),), state.velocities, inertial=False)
         x = yield stage
         return x, stage.velocity(x)

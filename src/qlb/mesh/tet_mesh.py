@@ -73,6 +73,11 @@ class TetMesh:
         """Indices of the nodes whose rest positions meet `condition`: (n, 3) positions [m] -> (n,) booleans."""
         return np.flatnonzero(condition(self.positions)).astype(np.int32)
 
+    def faces_where(self, condition: Callable[[FloatArray], BoolArray]) -> IntArray:
+        """Outward surface triangles (k, 3) whose rest centroids meet `condition`: (f, 3) [m] -> (f,) booleans."""
+        faces = self.boundary_triangles()
+        return faces[condition(self.positions[faces].mean(axis=1))]
+
     def centroids(self) -> FloatArray:
         """Rest positions of the centroids of the tets [m], shape (m, 3)."""
         return np.asarray(self.positions[self.tets].mean(axis=1), dtype=np.float64)

@@ -8,21 +8,15 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from qlb.energies import Acceleration, Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, Fibres, StableNeoHookean
 from qlb.settings import Settings, choice, quantity
 from qlb.simulation import OnFailure, Simulation
 from qlb.solvers import SOLVERS, SolverSettings, Tolerance
-from qlb.system import Acceleration
 from qlb.system.system import MassKind
 
 Vector = tuple[float, float, float]
-
-
-class DampingSettings(Settings):
-    """Damping of the motion."""
-
-    mass: float = quantity(0.0, "Rayleigh's mass-proportional damping alpha, a force -alpha M v", unit="1/s", ge=0)
 
 
 class LoadSettings(Settings):
@@ -49,7 +43,7 @@ class Scene(Settings):
     material: AnyMaterial = Field(StableNeoHookean(), description="What the body is made of")
     fibres: Fibres | None = Field(None, description="Fibres that are added to the material")
     mass: MassKind = Field("lumped", description="lumped or consistent mass matrix")
-    damping: DampingSettings = DampingSettings()
+    damping: Damping = Damping()
     loads: LoadSettings = LoadSettings()
     integrator: str = choice("BDF2", "Time integrator", INTEGRATORS)
     solver: str = choice("QLB", "Nonlinear solver", SOLVERS)
@@ -87,7 +81,7 @@ class Scene(Settings):
             "step": self.step,
             "gravity": self.gravity(),
             "mass": self.mass,
-            "mass_damping": self.damping.mass,
+            "damping": self.damping,
             "tolerance": self.tolerance,
             "solver_settings": self.solver_settings,
             "on_failure": self.on_failure,

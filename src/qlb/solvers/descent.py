@@ -49,13 +49,34 @@ class Descent(ABC):
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take back what `save` gave."""
 
-    def minimise(self, problem: StageProblem) -> SolveResult:
-        """Minimise the stage's E from the initial guess until the tolerance is met or the solve fails."""
+    def solve(self, problem: StageProblem) -> SolveResult:
+        """Minimise the stage's E; where its terms lag something, again with that taken at the solution, till it stays.
+
+        The last pass finds the tolerance met without an iteration; all passes share `max_iterations`.
+        """
+        result, iterations = self.minimise(problem), -1
+        while result.reason.converged and result.iterations > iterations:
+            refreshed = problem.refreshed(result.positions)
+            if refreshed is None:
+                break
+            iterations = result.iterations
+            result = self.minimise(refreshed, result)
+        return result
+
+    def minimise(self, problem: StageProblem, earlier: SolveResult | None = None) -> SolveResult:
+        """Minimise the stage's E from the initial guess until the tolerance is met or the solve fails.
+
+        Or from where an `earlier` solve of the same stage ended, against the same reference, adding to its rows.
+        """
         log = _Log(problem, self.factor)
-        log.add(self._initial_point(problem), 0.0)
-        reference = log.point.residual
-        if log.point.x is not problem.start:
-            reference = problem.residual(problem.value_gradient(problem.start)[1])
+        if earlier is None:
+            log.add(self._initial_point(problem), 0.0)
+            reference = log.point.residual
+            if log.point.x is not problem.start:
+                reference = problem.residual(problem.value_gradient(problem.start)[1])
+        else:
+            log.rows, log.point = list(earlier.rows), Point.at(problem, earlier.positions)
+            reference = earlier.reference
         try:
             reason = self._descend(problem, log, reference)
         except FloatingPointError:  # a Hessian that is not finite

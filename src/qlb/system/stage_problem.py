@@ -22,17 +22,32 @@ class StageProblem:
     c^2 = 1. Gradients have zeros, and positions the prescribed values, at the held degrees of freedom.
     """
 
-    def __init__(self, system: System, stage: Stage, state: State, timer: Timer) -> None:
+    def __init__(
+        self, system: System, stage: Stage, state: State, timer: Timer, guess: FloatArray | None = None
+    ) -> None:
+        """`guess` (n, 3) [m]: where terms take what they lag; the predictor by default."""
         self.system = system
         self.stage = stage
         self.timer = timer
         self._state = state
         self.start: FloatArray = system.held.place(state.positions, stage.time)
         """x_k [m] with the held nodes where they are at the stage's time, shape (n, 3)."""
-        self._mass_scale = 1.0 + stage.c * system.mass_damping if stage.inertial else 0.0
+        self._mass_scale = 1.0 + stage.c * system.damping.mass if stage.inertial else 0.0
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
-        self._potentials = [*system.potentials, *(term.at(stage, self.predictor) for term in system.terms)]
+        guess = self.predictor if guess is None else guess
+        terms = [term.at(stage, guess) for term in system.terms]
+        self._potentials = [*system.potentials, *(potential for potential in terms if potential is not None)]
         self._hessian: _native.BlockMatrix | None = None
+
+    def refreshed(self, x: FloatArray) -> StageProblem | None:
+        """The problem with what its terms lag taken at `x` (n, 3) [m]; None where that is of no need.
+
+        With inertia the predictor is near enough for the order of the integrator; statics has no time step that would
+        make what is lagged small.
+        """
+        if self.stage.inertial or not any(term.lagged for term in self.system.terms):
+            return None
+        return StageProblem(self.system, self.stage, self._state, self.timer, x)
 
     @property
     def force_scale(self) -> float:
@@ -48,8 +63,11 @@ class StageProblem:
     def residual_rounding(self) -> float:
         """What rounding of the positions leaves of |g|: some eps of mass and stiffness times the largest coordinate."""
         system, extent = self.system, float(np.abs(self.start).max())
-        inertia, elasticity = self._mass_scale * system.norm(system.mass), self.force_scale * system.norm(system.spring)
-        return 1e-15 * extent * (inertia + elasticity)
+        spring = system.norm(system.spring)
+        if self.stage.inertial:
+            damping = system.damping.stiffness * spring + system.norm(system.viscous_spring)
+            spring += damping / self.stage.c
+        return 1e-15 * extent * (self._mass_scale * system.norm(system.mass) + self.force_scale * spring)
 
     @cached_property
     def energy_rounding(self) -> float:

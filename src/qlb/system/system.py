@@ -9,13 +9,14 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray, IntArray, LongArray
+from qlb.energies import Acceleration, Damping, Energy, Gravity, Potential, Term
+from qlb.energies.damping import KelvinVoigt, StiffnessDamping
 from qlb.errors import InputError
 from qlb.materials.fibres import Fibres
 from qlb.materials.material import Material, per_element
 from qlb.mesh.tet_mesh import TetMesh
-from qlb.system.gravity import Acceleration, Gravity
+from qlb.settings import on_mesh
 from qlb.system.held_nodes import HeldNodes
-from qlb.system.potential import Potential, Term
 
 MassKind = Literal["lumped", "consistent"]
 
@@ -31,6 +32,7 @@ class System:
         mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
         spring: (lambda + 2 mu)_i V_i^(1/3) of each node [N/m], about a tenth of its diagonal stiffness, shape (n,).
+        viscous_spring: eta_i V_i^(1/3) of each node [N s/m], as `spring` for viscosity, shape (n,).
         energy_scale: sum of (lambda + 2 mu)_e V_e over the elements [J].
     """
 
@@ -42,15 +44,16 @@ class System:
         fibres: Sequence[Fibres] = (),
         gravity: Acceleration,
         mass: MassKind,
-        mass_damping: float,
+        damping: Damping,
+        energies: Sequence[Energy] = (),
         held: HeldNodes,
         threads: int,
     ) -> None:
         self.mesh = mesh
         self.held = held
-        self.mass_damping = mass_damping
+        self.damping = on_mesh(damping, "damping", mesh)
         self.threads = threads
-        self.pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
+        self.pattern = _native.BlockPattern(len(mesh.positions), _cliques(mesh, energies))
         blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
         material = material.on(mesh)
         parameters = material.parameter_table(len(mesh.tets))
@@ -64,13 +67,28 @@ class System:
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
         self.mass: FloatArray = np.add.reduceat(values, row_begin[:-1])
         self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
-        self.terms: list[Term] = [self.gravity]
+        self.terms: list[Term] = [self.gravity, *self._damping_terms(blocks)]
+        self.terms += [energy.term(mesh, self.pattern, threads) for energy in energies]
         modulus = per_element(material, material.modulus(), len(mesh.tets))
         stiffest = per_element(material, material.wave_modulus(), len(mesh.tets))
         self.stiffness = _node_stiffness(mesh, modulus, 2 / 3)
         self.spring = _node_stiffness(mesh, stiffest, 1 / 3)
+        self.viscous_spring = _node_stiffness(mesh, self._viscosity(), 1 / 3)
         self.energy_scale = float(stiffest @ mesh.volumes())
         self._fixed = np.flatnonzero(held.fixed.ravel())
+
+    def _damping_terms(self, blocks: _native.TetBlocks) -> list[Term]:
+        terms: list[Term] = []
+        if self.damping.stiffness > 0:
+            terms.append(StiffnessDamping(self.damping.stiffness, self.potentials, self.pattern, self.threads))
+        if self._viscosity().any():
+            terms.append(KelvinVoigt(blocks, self._viscosity(), self.threads))
+        return terms
+
+    def _viscosity(self) -> FloatArray:
+        """eta of each element [Pa s], shape (m,)."""
+        viscosity = np.asarray(self.damping.viscosity, dtype=np.float64)
+        return np.ascontiguousarray(np.broadcast_to(viscosity, (len(self.mesh.tets),)))
 
     @property
     def nodes(self) -> int:
@@ -93,6 +111,17 @@ class System:
     def analyse(self) -> _native.Cholesky:
         """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
         return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
+
+
+def _cliques(mesh: TetMesh, energies: Sequence[Energy]) -> IntArray:
+    """Sets of four nodes that are coupled: the tets, and each pair that an energy couples, filled up by repetition."""
+    cliques = [mesh.tets]
+    for energy in energies:
+        sets = energy.node_sets(mesh)
+        first, second = np.triu_indices(sets.shape[1], k=1)
+        pairs = np.stack([sets[:, first].ravel(), sets[:, second].ravel()], axis=1)
+        cliques.append(np.unique(pairs, axis=0)[:, [0, 1, 1, 1]])
+    return np.concatenate(cliques)
 
 
 def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tuple[LongArray, IntArray, FloatArray]:

@@ -22,8 +22,15 @@ class Potential(Protocol):
 class Term(Protocol):
     """A load, a damping or any other part of a system whose potential differs from stage to stage."""
 
-    def at(self, stage: Stage, guess: FloatArray) -> Potential:
-        """Its potential in a stage. `guess` (n, 3) [m] is a prediction of the stage's positions, of second order."""
+    lagged: bool
+    """Whether its potential freezes something at `guess` that belongs at the solution."""
+
+    def at(self, stage: Stage, guess: FloatArray) -> Potential | None:
+        """Its potential in a stage; None where it plays no part in it.
+
+        `guess` (n, 3) [m] is a prediction of the stage's positions, of second order. Where there is no inertia, the
+        stage is solved again with the solution for a guess, until what is lagged no longer matters.
+        """
 
 
 class DeadLoad:

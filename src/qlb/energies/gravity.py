@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from qlb.arrays import FloatArray, vectors
+from qlb.energies.potential import DeadLoad
 from qlb.integrators.integrator import Stage
-from qlb.system.potential import DeadLoad
 
 Acceleration = tuple[float, float, float] | Callable[[float], FloatArray]
 """[m/s^2], constant or a function of time [s]."""
@@ -14,6 +14,8 @@ Acceleration = tuple[float, float, float] | Callable[[float], FloatArray]
 
 class Gravity:
     """The weight of every node: its share of the mass [kg] times an acceleration."""
+
+    lagged = False
 
     def __init__(self, mass: FloatArray, acceleration: Acceleration, rest: FloatArray, threads: int) -> None:
         self._mass, self._acceleration, self._rest, self._threads = mass, acceleration, rest, threads
