@@ -4,6 +4,7 @@
 
 #include "elements/dispatch.hpp"
 #include "elements/elastic_energy.hpp"
+#include "elements/nodal_rotations.hpp"
 #include "energies/inertia.hpp"
 #include "energies/viscosity.hpp"
 
@@ -109,6 +110,17 @@ void bind_energies(nb::module_& m) {
           },
           nb::arg("x"), nb::arg("target"), nb::arg("scale"), nb::arg("gradient").noconvert(), ReleaseGil())
       .def("add_hessian", &Inertia::add_hessian, nb::arg("scale"), nb::arg("matrix"), ReleaseGil());
+
+  m.def(
+      "nodal_rotations",
+      [](std::shared_ptr<TetBlocks> blocks, const Array<const double>& x, const Array<const double>& reference,
+         const Array<double>& rotations, int threads) {
+        NodalRotations geometry(std::move(blocks), threads);
+        geometry.compute(sized(x, 3 * geometry.nodes(), "x"), sized(reference, 3 * geometry.nodes(), "reference"),
+                         sized(rotations, 9 * geometry.nodes(), "rotations"));
+      },
+      nb::arg("blocks"), nb::arg("x"), nb::arg("reference"), nb::arg("rotations").noconvert(), nb::arg("threads"),
+      ReleaseGil());
 
   m.def("evaluate_density", &evaluate_density, nb::arg("material"), nb::arg("F"), nb::arg("parameters"),
         nb::arg("project"), nb::arg("energy").noconvert(), nb::arg("stress").noconvert(),

@@ -2,6 +2,7 @@
 
 #include "linalg/cholmod_cholesky.hpp"
 #include "linalg/lbfgs.hpp"
+#include "linalg/rotated_inverse.hpp"
 #include "linalg/vector_ops.hpp"
 
 namespace qlb {
@@ -27,6 +28,21 @@ void bind_linalg(nb::module_& m) {
           [](CholmodCholesky* self, std::shared_ptr<BlockPattern> pattern, const Array<const std::uint8_t>& fixed,
              int threads) { new (self) CholmodCholesky(std::move(pattern), view(fixed), threads); },
           nb::arg("pattern"), nb::arg("fixed"), nb::arg("threads"), ReleaseGil());
+
+  nb::class_<RotatedInverse, InverseOperator>(m, "RotatedInverse", "An inverse carried along by nodal rotations.")
+      .def(
+          "__init__",
+          [](RotatedInverse* self, std::shared_ptr<InverseOperator> inner, std::shared_ptr<TetBlocks> blocks,
+             const Array<const std::uint8_t>& fixed,
+             int threads) { new (self) RotatedInverse(std::move(inner), std::move(blocks), view(fixed), threads); },
+          nb::arg("inner"), nb::arg("blocks"), nb::arg("fixed"), nb::arg("threads"))
+      .def(
+          "turn",
+          [](RotatedInverse& op, const Array<const double>& x, const Array<const double>& reference) {
+            op.turn(sized(x, op.size(), "x"), sized(reference, op.size(), "reference"));
+          },
+          nb::arg("x"), nb::arg("reference"), ReleaseGil())
+      .def("reset", &RotatedInverse::reset);
 
   nb::class_<Lbfgs>(m, "Lbfgs", "Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).")
       .def(nb::init<std::int64_t, int, int>(), nb::arg("size"), nb::arg("window"), nb::arg("threads"))

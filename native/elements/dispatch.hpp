@@ -12,6 +12,8 @@ namespace qlb {
 std::vector<std::string> simd_levels();
 // Throws std::invalid_argument for a material or a level that is not there; an empty level means the best.
 const MaterialKernels& find_kernels(const std::string& material, const std::string& level = "");
+// Those of the best level.
+const GeometryKernels& geometry_kernels();
 std::vector<std::string> material_names();
 
 }  // namespace qlb

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "elements/dispatch.hpp"
+#include "elements/slot_sums.hpp"
 
 namespace qlb {
 namespace {
@@ -12,21 +13,6 @@ namespace {
 // Waking a thread costs about as much as four chunks of work.
 int threads_worth(std::size_t chunks, int threads) {
   return std::max(1, std::min(threads, static_cast<int>(chunks / 4)));
-}
-
-// target[t, :] += scale * (sum of its slots), in the fixed order of the lists.
-template <int N, int Stride = N>
-void add_slots(const SlotLists& lists, const double* slots, double scale, double* target, int threads) {
-  const auto targets = static_cast<std::int64_t>(lists.begin.size()) - 1;
-#pragma omp parallel for schedule(static) num_threads(threads)
-  for (std::int64_t t = 0; t < targets; ++t) {
-    double sum[N] = {};
-    for (std::int64_t k = lists.begin[t]; k < lists.begin[t + 1]; ++k) {
-      const double* slot = slots + Stride * static_cast<std::int64_t>(lists.slot[k]);
-      for (int i = 0; i < N; ++i) sum[i] += slot[i];
-    }
-    for (int i = 0; i < N; ++i) target[N * t + i] += scale * sum[i];
-  }
 }
 
 }  // namespace
@@ -47,16 +33,9 @@ ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std:
 }
 
 ChunkData ElasticEnergy::chunk_data(const Chunk& c) const {
-  const TetBlocks& b = *blocks_;
-  return {b.vertex.data() + c.first_pack * 4 * kLanes,
-          b.pair.data() + c.first_pack * kPairs * kLanes,
-          b.shape.data() + c.first_pack * 9 * kLanes,
-          b.volume.data() + c.first_pack * kLanes,
-          parameters_.data() + c.first_pack * kernels_->parameter_count * kLanes,
-          c.packs,
-          b.slot_node.data() + c.first_slot,
-          c.slots,
-          c.block_slots};
+  ChunkData data = chunk_geometry(*blocks_, c);
+  data.parameters = parameters_.data() + c.first_pack * kernels_->parameter_count * kLanes;
+  return data;
 }
 
 template <class Kernel>

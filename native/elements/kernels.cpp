@@ -3,6 +3,7 @@
 #include "elements/kernels.hpp"
 
 #include "elements/element_loop.hpp"
+#include "elements/rotation_kernels.hpp"
 #include "materials/all.hpp"
 #include "simd/arch.hpp"
 
@@ -10,28 +11,29 @@ namespace qlb {
 namespace {
 
 template <template <class> class... M>
-const MaterialKernels* kernel_table(MaterialList<M...>) {
-  static const MaterialKernels table[] = {make_kernels<Vec, M>()..., MaterialKernels{}};
-  return table;
+const KernelSet& kernel_set(MaterialList<M...>) {
+  static const MaterialKernels materials[] = {make_kernels<Vec, M>()..., MaterialKernels{}};
+  static const KernelSet set = {materials, {chunk_correlations<Vec>, nearest_rotations<Vec>}};
+  return set;
 }
 
 }  // namespace
 
 #if defined(QLB_SIMD_AVX512)
-const MaterialKernels* kernels_AVX512() {
-  return kernel_table(AllMaterials{});
+const KernelSet& kernels_AVX512() {
+  return kernel_set(AllMaterials{});
 }
 #elif defined(QLB_SIMD_AVX2)
-const MaterialKernels* kernels_AVX2() {
-  return kernel_table(AllMaterials{});
+const KernelSet& kernels_AVX2() {
+  return kernel_set(AllMaterials{});
 }
 #elif defined(QLB_SIMD_NEON64)
-const MaterialKernels* kernels_NEON64() {
-  return kernel_table(AllMaterials{});
+const KernelSet& kernels_NEON64() {
+  return kernel_set(AllMaterials{});
 }
 #else
-const MaterialKernels* kernels_SSE2() {
-  return kernel_table(AllMaterials{});
+const KernelSet& kernels_SSE2() {
+  return kernel_set(AllMaterials{});
 }
 #endif
 

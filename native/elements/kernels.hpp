@@ -33,10 +33,20 @@ struct MaterialKernels {
                   double* stiffness);
 };
 
-// All materials at one level, ended by an entry whose name is null.
-const MaterialKernels* kernels_SSE2();
-const MaterialKernels* kernels_AVX2();
-const MaterialKernels* kernels_AVX512();
-const MaterialKernels* kernels_NEON64();
+// Kernels of the geometry alone (rotation_kernels.hpp).
+struct GeometryKernels {
+  void (*correlations)(const ChunkData&, const double* x, const double* reference, double* scratch, double* slot_sums);
+  void (*nearest_rotations)(double* matrices, std::int64_t count);
+};
+
+struct KernelSet {
+  const MaterialKernels* materials;  // ended by an entry whose name is null
+  GeometryKernels geometry;
+};
+
+const KernelSet& kernels_SSE2();
+const KernelSet& kernels_AVX2();
+const KernelSet& kernels_AVX512();
+const KernelSet& kernels_NEON64();
 
 }  // namespace qlb

@@ -145,4 +145,16 @@ Aligned<double> TetBlocks::scatter(std::span<const double> values, std::int64_t 
   return out;
 }
 
+ChunkData chunk_geometry(const TetBlocks& blocks, const Chunk& chunk) {
+  return {blocks.vertex.data() + chunk.first_pack * 4 * kLanes,
+          blocks.pair.data() + chunk.first_pack * kPairs * kLanes,
+          blocks.shape.data() + chunk.first_pack * 9 * kLanes,
+          blocks.volume.data() + chunk.first_pack * kLanes,
+          nullptr,
+          chunk.packs,
+          blocks.slot_node.data() + chunk.first_slot,
+          chunk.slots,
+          chunk.block_slots};
+}
+
 }  // namespace qlb

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "assembly/block_pattern.hpp"
+#include "elements/kernels.hpp"
 #include "elements/lanes.hpp"
 #include "simd/aligned.hpp"
 
@@ -49,5 +50,8 @@ struct TetBlocks {
   // Per-element values (elements, width) laid out as (packs, width, kLanes).
   Aligned<double> scatter(std::span<const double> values, std::int64_t width) const;
 };
+
+// One chunk for the kernels, without parameters.
+ChunkData chunk_geometry(const TetBlocks& blocks, const Chunk& chunk);
 
 }  // namespace qlb

@@ -71,6 +71,8 @@ class Inertia:
 
     def add_hessian(self, scale: float, matrix: BlockMatrix) -> None: ...
 
+def nodal_rotations(blocks: TetBlocks, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], reference: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], rotations: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], threads: int) -> None: ...
+
 def evaluate_density(material: str, F: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], parameters: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], project: bool, energy: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stress: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], simd_level: str = '') -> None: ...
 
 class InverseOperator:
@@ -94,6 +96,15 @@ class Cholesky(InverseOperator):
 
 class CholmodCholesky(Cholesky):
     def __init__(self, pattern: BlockPattern, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int) -> None: ...
+
+class RotatedInverse(InverseOperator):
+    """An inverse carried along by nodal rotations."""
+
+    def __init__(self, inner: InverseOperator, blocks: TetBlocks, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int) -> None: ...
+
+    def turn(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], reference: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None: ...
+
+    def reset(self) -> None: ...
 
 class Lbfgs:
     """

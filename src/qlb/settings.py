@@ -119,7 +119,7 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
             bounds: Any = extra["bounds"]
             if _may_vary(field.annotation):
                 value = _as_varying(value)
-            return _checked(value, bounds, str(extra["unit"]), whole=field.annotation is int)
+            return _checked(value, bounds, str(extra["unit"]), whole=field.annotation in (int, int | None))
         return value
 
 

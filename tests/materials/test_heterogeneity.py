@@ -53,7 +53,7 @@ def test_fibres_vary_in_strength(mesh: TetMesh) -> None:
         Fibres(modulus="x - 0.5").parameter_table(mesh)
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 def test_a_bar_of_an_expression_is_that_of_the_array_to_the_bit(mesh: TetMesh, solver: str) -> None:
     def last(young: object) -> np.ndarray:
         material = StableNeoHookean(young=young, density="1000 + 500 * y")  # type: ignore[arg-type]

@@ -53,7 +53,7 @@ def test_momentum_is_kept(integrator: str, mass: str) -> None:
     np.testing.assert_allclose(momentum(simulation), before, rtol=0, atol=1e-10 * np.linalg.norm(before))
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB", "QLA"])
 def test_momentum_is_kept_to_the_default_tolerance(solver: str) -> None:
     simulation = spinning("BDF2", 50, solver=solver, tolerance=Tolerance())
     before = momentum(simulation)

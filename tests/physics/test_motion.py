@@ -37,7 +37,7 @@ def test_a_confined_bar_vibrates_with_the_speed_of_sound(poisson: float, wave_mo
     assert abs(end.velocities[tip, 0].mean()) <= 0.05 * amplitude * np.pi / half_period
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB", "QLA"])
 def test_a_symmetric_bar_falls_symmetrically(solver: str) -> None:
     mesh = TetMesh.box((1.0, 0.2, 0.2), cells=(6, 2, 2))
     simulation = Simulation(
@@ -67,7 +67,7 @@ def drop(scale: float, pressure: float, **arguments: object) -> Array:
 
 @pytest.mark.parametrize(("scale", "pressure"), [(1.0, 1e6), (1.0, 1e-6), (1e-3, 1.0), (100.0, 1.0)])
 @pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2", "quasistatic"])
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 def test_units_do_not_matter(solver: str, integrator: str, scale: float, pressure: float) -> None:
     expected = drop(1.0, 1.0, solver=solver, integrator=integrator)
     found = drop(scale, pressure, solver=solver, integrator=integrator)

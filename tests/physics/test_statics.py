@@ -34,7 +34,7 @@ def affine(anchors: Array, time: float) -> Array:
     return anchors + time * (anchors @ AFFINE.T + SHIFT - anchors)
 
 
-@pytest.mark.parametrize(("solver", "accuracy"), [("ND", 1e-10), ("QLB", 1e-8), ("QLF", 1e-8)])
+@pytest.mark.parametrize(("solver", "accuracy"), [("ND", 1e-10), ("QLB", 1e-8), ("QLF", 1e-8), ("QLA", 1e-8)])
 @pytest.mark.parametrize("poisson", [0.0, 0.4])
 def test_patch(solver: str, accuracy: float, poisson: float, rng: np.random.Generator) -> None:
     # An affine motion of the boundary makes the whole body affine, on any mesh and from any start.

@@ -129,7 +129,7 @@ def test_stride_keeps_the_last_step(make_run):
 
 
 @pytest.mark.parametrize("integrator", ["BDF2", "SDIRK2", "quasistatic"])
-@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB", "QLA"])
 def test_a_checkpoint_goes_on_to_the_same_bits(tmp_path, make_simulation, integrator, solver):
     settings = {"integrator": integrator, "solver": solver, "gravity": lambda time: (0.0, -5 * time, 0.0)}
     unbroken = list(make_simulation(**settings).run(6))

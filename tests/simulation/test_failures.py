@@ -171,11 +171,16 @@ def test_accept_says_of_a_step_that_it_was_not_finite() -> None:
 
 def test_the_simulation_can_go_on_after_a_failure() -> None:
     # The failed attempt has left no trace in the solver: the same step with room to converge gives the same bits.
-    for solver in ("ND", "QLF", "QLB"):
+    # QLA may have made a new factor on the way, which leads to the same solution within the tolerance.
+    for solver in ("ND", "QLF", "QLB", "QLA"):
         simulation, calm = (bar(integrator="BDF2", solver=solver, step=0.05) for _ in range(2))
         finish(simulation, 2)
-        roomy, simulation.solver.settings = simulation.solver.settings, SolverSettings(max_iterations=1)
+        roomy, simulation.solver.settings = (
+            simulation.solver.settings,
+            simulation.solver.settings.model_copy(update={"max_iterations": 1}),
+        )
         with pytest.raises(StepFailed):
             simulation.advance()
         simulation.solver.settings = roomy
-        np.testing.assert_array_equal(finish(simulation, 2).positions, finish(calm, 4).positions)
+        error = np.abs(finish(simulation, 2).positions - finish(calm, 4).positions).max()
+        assert error <= (1e-6 if solver == "QLA" else 0.0)

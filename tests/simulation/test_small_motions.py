@@ -18,7 +18,7 @@ def bar(**arguments: object) -> Simulation:
     return simulation
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 @pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2"])
 @pytest.mark.parametrize("h", [1e-2, 1e-4])
 def test_a_load_that_sets_in_smoothly_is_followed_from_rest(h: float, integrator: str, solver: str) -> None:
@@ -31,7 +31,7 @@ def test_a_load_that_sets_in_smoothly_is_followed_from_rest(h: float, integrator
     assert all(result.converged for result in simulation.run(20))
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 @pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2"])
 def test_a_scripted_end_that_sets_off_smoothly_is_followed_from_rest(integrator: str, solver: str) -> None:
     simulation = bar(integrator=integrator, solver=solver, step=1e-3, gravity=(0.0, 0.0, 0.0))
@@ -39,7 +39,7 @@ def test_a_scripted_end_that_sets_off_smoothly_is_followed_from_rest(integrator:
     assert all(result.converged for result in simulation.run(20))
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 @pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2", "quasistatic"])
 @pytest.mark.parametrize("gravity", [1e-2, 1e-6])
 def test_a_tiny_load_moves_the_bar_in_proportion(gravity: float, integrator: str, solver: str) -> None:
@@ -54,7 +54,7 @@ def test_a_tiny_load_moves_the_bar_in_proportion(gravity: float, integrator: str
     np.testing.assert_allclose(10 * tiny, small, rtol=0, atol=5e-3 * np.abs(small).max() + 1e-14)
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 def test_a_bar_that_has_come_to_rest_stays_there(solver: str) -> None:
     simulation = bar(integrator="BDF1", solver=solver, step=0.5, damping=Damping(mass=20.0))
     for _ in simulation.run(30):
@@ -65,7 +65,7 @@ def test_a_bar_that_has_come_to_rest_stays_there(solver: str) -> None:
     np.testing.assert_allclose(simulation.state.positions, resting, rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 @pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
 def test_an_equilibrium_under_a_constant_load_is_found_again(poisson: float, solver: str) -> None:
     # From the second step on |g(x_k)| is nothing but what the first has left.
@@ -77,7 +77,7 @@ def test_an_equilibrium_under_a_constant_load_is_found_again(poisson: float, sol
     np.testing.assert_allclose(simulation.state.positions, first, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 @pytest.mark.parametrize("integrator", ["BDF1", "BDF2", "SDIRK2", "quasistatic"])
 def test_a_light_load_moves_a_nearly_incompressible_body(integrator: str, solver: str) -> None:
     # Rounding of the positions alone makes forces of eps |K||x|, K here 1700 times Young's modulus: with 6144 tets

@@ -98,7 +98,7 @@ def test_after_a_failed_search_the_projected_hessian_is_tried_once() -> None:
     solver = make_solver("ND", system, projection="on-demand")
     problem = problem_of(system, swinging(system))
     point = Point.at(problem, problem.start)
-    solver.begin_solve(problem)
+    solver.begin_solve(problem, Point.at(problem, problem.start), 0.0)
     solver.direction(problem, point)
     assert not solver.factor.projected
     assert solver.recover(problem, point)

@@ -46,14 +46,14 @@ def test_both_stages_of_sdirk2_share_the_factor_of_qlb() -> None:
         assert all(solve.iterations > 0 for solve in result.solves)
 
 
-@pytest.mark.parametrize("solver", ["QLF", "QLB"])
+@pytest.mark.parametrize("solver", ["QLF", "QLB", "QLA"])
 def test_the_first_direction_is_that_of_the_factor(solver: str) -> None:
     system = bar_system()
     problem = problem_of(system, swinging(system))
-    method, newton = make_solver(solver, system), make_solver("ND", system)
+    method, newton = make_solver(solver, system, projection="always"), make_solver("ND", system)
     point = Point.at(problem, problem.start)
     method.begin_step()
-    method.begin_solve(problem)
+    method.begin_solve(problem, point, 0.0)
     p, slope = method.direction(problem, point)
     expected, expected_slope = newton.direction(problem, point)
     np.testing.assert_allclose(p, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
@@ -66,7 +66,7 @@ def test_pairs_are_dropped_before_each_solve() -> None:
     problem = problem_of(system, swinging(system))
     method.minimise(problem)
     assert method.history.pairs > 0  # type: ignore[attr-defined]
-    method.begin_solve(problem)
+    method.begin_solve(problem, Point.at(problem, problem.start), 0.0)
     assert method.history.pairs == 0  # type: ignore[attr-defined]
 
 

@@ -70,7 +70,7 @@ def test_a_solve_that_needs_all_its_iterations_has_converged(solver: str) -> Non
 def test_line_search_failed(solver: str) -> None:
     system = bar_system()
     problem = problem_of(system, swinging(system), kind=WrongGradient)
-    result = make_solver(solver, system).minimise(problem)
+    result = make_solver(solver, system, initial_guess="previous").minimise(problem)
     assert result.reason is Reason.LINE_SEARCH_FAILED
     np.testing.assert_array_equal(result.positions, problem.start)
     assert result.rows[-1].step_length == 0.0

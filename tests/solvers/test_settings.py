@@ -5,6 +5,7 @@ from pydantic import ValidationError
 
 from qlb import InputError, SolverSettings, Tolerance
 from qlb.settings import Settings
+from qlb.solvers import SOLVERS
 
 
 @pytest.mark.parametrize(
@@ -64,4 +65,6 @@ def test_settings_do_not_change() -> None:
 def test_defaults_are_those_of_the_supplement() -> None:
     assert Tolerance().relative == 1e-6
     assert Tolerance().absolute == 0.0
-    assert SolverSettings().window == 5
+    for solver in ("ND", "QLF", "QLB"):
+        complete = SolverSettings().completed(SOLVERS[solver].defaults)
+        assert (complete.projection, complete.initial_guess, complete.window) == ("always", "previous", 5)

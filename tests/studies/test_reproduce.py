@@ -55,7 +55,6 @@ def test_the_figures_are_the_supplements():
     assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3]
     scene = load_scene("bar")
     assert (scene.steps, scene.tolerance.relative, scene.tolerance.absolute) == (120, 1e-6, 0)
-    assert (scene.solver_settings.initial_guess, scene.solver_settings.window) == ("previous", 5)
 
 
 def test_columns_are_the_papers_solvers_and_ours_where_it_is_there():

@@ -76,7 +76,7 @@ def test_inner_product(threads: int, size: int, rng: np.random.Generator) -> Non
     assert one == pytest.approx(float(a @ b), rel=0, abs=1e-13 * float(np.abs(a) @ np.abs(b)))
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLB"])
+@pytest.mark.parametrize("solver", ["ND", "QLB", "QLA"])
 def test_a_whole_run(mesh: TetMesh, solver: str) -> None:
     ends = []
     for threads in (1, 2):

@@ -1,16 +1,18 @@
 """Nonlinear solvers. All minimise a `StageProblem` and stop at a tolerance, with a reason."""
 
+from qlb.solvers.adaptive import QLA
 from qlb.solvers.descent import Descent
 from qlb.solvers.newton import ND
 from qlb.solvers.quasi_newton import QLB, QLF
 from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
 
-SOLVERS: dict[str, type[Descent]] = {"ND": ND, "QLF": QLF, "QLB": QLB}
+SOLVERS: dict[str, type[Descent]] = {"ND": ND, "QLF": QLF, "QLB": QLB, "QLA": QLA}
 """Every solver by the name that scene files and the command line use."""
 
 __all__ = [
     "ND",
+    "QLA",
     "QLB",
     "QLF",
     "SOLVERS",

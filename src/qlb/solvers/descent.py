@@ -19,17 +19,22 @@ class Descent(ABC):
     """A descent method: a subclass says which direction to search, and what to do when a search fails."""
 
     name: ClassVar[str]
+    defaults: ClassVar[dict[str, object]] = {"projection": "always", "initial_guess": "previous", "window": 5}
+    """What a setting is where the user gives none."""
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
-        self.settings = settings
+        self.settings = settings.completed(self.defaults)
         self.tolerance = tolerance
         self.factor = Factor(system)
 
     def begin_step(self) -> None:
         """Called once before the stages of each time step."""
 
-    def begin_solve(self, problem: StageProblem) -> None:
-        """Called once before the iterations of each stage."""
+    def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
+        """Called once before the iterations of each stage, with the initial guess and the |g| that will do."""
+
+    def end_solve(self) -> None:
+        """Called once after the iterations of each stage."""
 
     @abstractmethod
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
@@ -87,8 +92,15 @@ class Descent(ABC):
         if not log.point.is_finite:
             return Reason.NOT_FINITE
         reason = self._converged(problem, log.point, reference)
-        if reason is None:
-            self.begin_solve(problem)
+        if reason is not None:
+            return reason
+        self.begin_solve(problem, log.point, max(self._goals(problem, reference)))
+        reason = self._iterate(problem, log, reference)
+        self.end_solve()
+        return reason
+
+    def _iterate(self, problem: StageProblem, log: _Log, reference: float) -> Reason:
+        reason = None
         while reason is None:
             if len(log.rows) > self.settings.max_iterations:
                 return Reason.MAX_ITERATIONS
@@ -120,14 +132,17 @@ class Descent(ABC):
             if not self.recover(problem, point):
                 return None
 
-    def _converged(self, problem: StageProblem, point: Point, reference: float) -> Reason | None:
+    def _goals(self, problem: StageProblem, reference: float) -> tuple[float, float]:
+        """The |g| that will do: the relative one, and the largest of the absolute ones."""
         tolerance = self.tolerance
-        if point.residual <= tolerance.relative * reference:
+        scaled = tolerance.scaled * problem.residual_scale
+        return tolerance.relative * reference, max(tolerance.absolute, scaled, problem.residual_rounding)
+
+    def _converged(self, problem: StageProblem, point: Point, reference: float) -> Reason | None:
+        relative, absolute = self._goals(problem, reference)
+        if point.residual <= relative:
             return Reason.CONVERGED_RELATIVE
-        goals = (tolerance.absolute, tolerance.scaled * problem.residual_scale, problem.residual_rounding)
-        if point.residual <= max(goals):
-            return Reason.CONVERGED_ABSOLUTE
-        return None
+        return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
 
 
 class _Log:

@@ -8,6 +8,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
+from qlb.errors import InputError
 from qlb.solvers.settings import Projection
 from qlb.system import StageProblem, System
 
@@ -17,6 +18,8 @@ class Factor:
 
     def __init__(self, system: System) -> None:
         self.cholesky = system.analyse()
+        self._pattern = system.pattern
+        self._matrix: _native.BlockMatrix | None = None
         self.count = 0
         """Factorisations tried so far."""
         self.projected = False
@@ -43,7 +46,22 @@ class Factor:
     def _factorise(self, problem: StageProblem, matrix: _native.BlockMatrix) -> bool:
         with problem.timer.section("factor"):
             self.count += 1
+            self._matrix = matrix
             return self.cholesky.factorise(matrix) < 0
+
+    def matrix_values(self) -> FloatArray:
+        """A copy of the blocks (b, 3, 3) that the factor in place is of. Raises `ValueError` where there is none."""
+        if self._matrix is None:
+            raise ValueError("nothing is factorised yet")
+        return self._matrix.values.copy()
+
+    def restore(self, values: FloatArray) -> None:
+        """Factorise what `matrix_values` gave, without counting it."""
+        self._matrix = _native.BlockMatrix(self._pattern)
+        if values.shape != self._matrix.values.shape:
+            raise InputError(f"blocks have shape {values.shape}, must be {self._matrix.values.shape}")
+        self._matrix.values[...] = values
+        self.cholesky.factorise(self._matrix)
 
     def solve(self, problem: StageProblem, b: FloatArray) -> FloatArray:
         """B^-1 b, shape (n, 3), zero at held degrees of freedom."""

@@ -31,7 +31,7 @@ class ND(Descent):
         """Go back to the projection that was asked for."""
         self._forced = None
 
-    def begin_solve(self, problem: StageProblem) -> None:
+    def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Start with the projection that was asked for."""
         self._forced = None
 

@@ -21,24 +21,28 @@ class FactoredLbfgs(Descent):
     The pairs are dropped before each solve. Which B, a subclass says.
     """
 
+    inverse: _native.InverseOperator
+    """B^-1"""
+
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         super().__init__(system, settings, tolerance)
-        self.history = _native.Lbfgs(3 * system.nodes, settings.window, system.threads)
+        self.history = _native.Lbfgs(3 * system.nodes, self.settings.window, system.threads)
+        self.inverse = self.factor.cholesky
 
     @abstractmethod
-    def prepare_factor(self, problem: StageProblem) -> None:
-        """See to it that `self.factor` is the one to use in this stage."""
+    def prepare_factor(self, problem: StageProblem, point: Point) -> None:
+        """See to it that `self.inverse` is the one to use in this stage, which starts at `point`."""
 
-    def begin_solve(self, problem: StageProblem) -> None:
+    def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Drop the pairs of the last solve and see to the factor."""
         self.history.clear()
-        self.prepare_factor(problem)
+        self.prepare_factor(problem, point)
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H g, H from the pairs over the factor."""
         with problem.timer.section("solve"):
             p = np.empty_like(point.gradient)
-            slope = self.history.direction(point.gradient, self.factor.cholesky, p)
+            slope = self.history.direction(point.gradient, self.inverse, p)
             return p, slope
 
     def accept(self, old: Point, new: Point) -> None:
@@ -64,7 +68,7 @@ class QLF(FactoredLbfgs):
     _start: FloatArray | None = None
     _c: float | None = None
 
-    def prepare_factor(self, problem: StageProblem) -> None:
+    def prepare_factor(self, problem: StageProblem, point: Point) -> None:
         """Factorise at the first positions ever seen, once for each c."""
         if self._start is None:
             self._start = problem.start
@@ -95,7 +99,7 @@ class QLB(FactoredLbfgs):
         """Forget the factor of the last step."""
         self._c = None
 
-    def prepare_factor(self, problem: StageProblem) -> None:
+    def prepare_factor(self, problem: StageProblem, point: Point) -> None:
         """Factorise at x_k, once a step."""
         if problem.stage.c != self._c:
             self.factor.update(problem, problem.start, self.settings.projection)

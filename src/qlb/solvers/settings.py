@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -26,16 +26,33 @@ class Tolerance(Settings):
 
 
 class SolverSettings(Settings):
-    """Settings of the nonlinear solvers; each says which solvers read it."""
+    """Settings of the nonlinear solvers; each says which solvers read it, and what they take where it is not given."""
 
-    projection: Projection = Field(
-        "always",
-        description="Project element Hessians to positive semidefinite (all solvers): always; on-demand: only where"
-        " Cholesky fails on the exact one; never: shift the diagonal instead",
+    projection: Projection | None = Field(
+        None,
+        description="Project element Hessians to positive semidefinite: always (default of ND, QLF, QLB); on-demand:"
+        " only where Cholesky fails on the exact one (default of QLA); never: shift the diagonal instead",
     )
-    initial_guess: InitialGuess = Field(
-        "previous",
-        description="Where a solve starts (all solvers): x_k, or the predictor from velocity and acceleration",
+    initial_guess: InitialGuess | None = Field(
+        None,
+        description="Where a solve starts: previous, that is x_k (default of ND, QLF, QLB), or the predictor from"
+        " velocity and acceleration (default of QLA)",
     )
     max_iterations: int = quantity(500, "Nonlinear iterations of one solve before it counts as failed", ge=1)
-    window: int = quantity(5, "Pairs that L-BFGS keeps (QLF, QLB)", ge=1, le=100)
+    window: int | None = quantity(None, "Pairs that L-BFGS keeps: 5 in QLF and QLB, 8 in QLA", ge=1, le=100)
+    keep_factor: bool = Field(True, description="Keep the factor over steps while that pays (QLA)")
+    rotate_factor: bool = Field(True, description="Carry the factor along with the rotation of the material (QLA)")
+    refactor_in_solve: bool = Field(True, description="Make a new factor within a solve that contracts slowly (QLA)")
+
+    def completed(self, defaults: dict[str, Any]) -> CompleteSettings:
+        """These settings with `defaults` for what is not given."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return CompleteSettings(**given | {k: v for k, v in defaults.items() if given[k] is None})
+
+
+class CompleteSettings(SolverSettings):
+    """What a solver goes by: nothing is left open."""
+
+    projection: Projection
+    initial_guess: InitialGuess
+    window: int

@@ -25,6 +25,7 @@ class System:
     """Mesh, material, mass, loads and held nodes, with the compiled energies over them.
 
     Attributes:
+        blocks: the tets as the compiled kernels take them.
         elastic: the elastic energy of the material [J].
         potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
         terms: what has another potential in each stage: loads, damping.
@@ -54,7 +55,7 @@ class System:
         self.damping = on_mesh(damping, "damping", mesh)
         self.threads = threads
         self.pattern = _native.BlockPattern(len(mesh.positions), _cliques(mesh, energies))
-        blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
+        self.blocks = blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
         material = material.on(mesh)
         parameters = material.parameter_table(len(mesh.tets))
         self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)

@@ -1,0 +1,33 @@
+#include "elements/nodal_rotations.hpp"
+
+#include <algorithm>
+
+#include "elements/dispatch.hpp"
+#include "elements/slot_sums.hpp"
+
+namespace qlb {
+
+NodalRotations::NodalRotations(std::shared_ptr<const TetBlocks> blocks, int threads)
+    : blocks_(std::move(blocks)), kernels_(&geometry_kernels()), threads_(threads) {
+  positions_.resize(2 * kStride * blocks_->slot_node.size());
+  slot_sums_.resize(9 * blocks_->slot_node.size());
+}
+
+void NodalRotations::compute(const double* x, const double* reference, double* rotations) {
+  const auto chunks = static_cast<std::int64_t>(blocks_->chunks.size());
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+  for (std::int64_t k = 0; k < chunks; ++k) {
+    const Chunk& chunk = blocks_->chunks[k];
+    kernels_->correlations(chunk_geometry(*blocks_, chunk), x, reference,
+                           positions_.data() + 2 * kStride * chunk.first_slot,
+                           slot_sums_.data() + 9 * chunk.first_slot);
+  }
+  std::fill(rotations, rotations + 9 * nodes(), 0.0);
+  add_slots<9>(blocks_->node_slots, slot_sums_.data(), 1.0, rotations, threads_);
+  constexpr std::int64_t kBatch = 1024;
+#pragma omp parallel for schedule(static) num_threads(threads_)
+  for (std::int64_t first = 0; first < nodes(); first += kBatch)
+    kernels_->nearest_rotations(rotations + 9 * first, std::min(kBatch, nodes() - first));
+}
+
+}  // namespace qlb

@@ -1,0 +1,132 @@
+"""QLA: L-BFGS over one Cholesky factor that is kept, turned with the material, and made anew when that pays."""
+
+from __future__ import annotations
+
+from math import inf, log
+from typing import ClassVar
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import FloatArray
+from qlb.solvers.line_search import Point
+from qlb.solvers.quasi_newton import FactoredLbfgs
+from qlb.solvers.settings import Projection, SolverSettings, Tolerance
+from qlb.solvers.work import cost_of_factor
+from qlb.system import StageProblem, System
+
+MAX_RESCUES = 3
+PATIENCE = 5
+
+
+class QLA(FactoredLbfgs):
+    """The factor B is the Hessian at some earlier initial guess, carried along: R B R^T with R the nodal rotations.
+
+    It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
+    cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
+    counted in iterations, from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
+    """
+
+    name: ClassVar[str] = "QLA"
+    defaults: ClassVar[dict[str, object]] = {
+        "projection": "on-demand",
+        "initial_guess": "predictor",
+        "window": 8,
+    }
+
+    def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
+        super().__init__(system, settings, tolerance)
+        self.inverse: _native.RotatedInverse
+        self.inverse = _native.RotatedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
+        self.kappa = cost_of_factor(self.factor.cholesky, len(system.mesh.tets))
+        """Cost of assembly and factorisation, in iterations."""
+        self._reference: FloatArray | None = None  # positions at which the factor was taken
+        self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
+        self._solves = self._spent = 0  # solves with this factor, and their iterations
+        self._stale = False
+
+    def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
+        """Start the account of a solve."""
+        self._goal, self._iterations, self._rescues = goal, 0, 0
+        super().begin_solve(problem, point, goal)
+
+    def prepare_factor(self, problem: StageProblem, point: Point) -> None:
+        """Turn the factor to the initial guess, or make a new one there."""
+        stale = self._stale or not self.settings.keep_factor or self._kind != _kind(problem)
+        if stale or self._reference is None:
+            self._refactor(problem, point, self.settings.projection)
+            return
+        self._mark(point)
+        if self.settings.rotate_factor:
+            with problem.timer.section("solve"):
+                self.inverse.turn(point.x, self._reference)
+
+    def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
+        """-H g, H from the pairs over the turned factor, which is made anew where contraction is too slow."""
+        if self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
+            self._refactor(problem, point, self.settings.projection)
+        return super().direction(problem, point)
+
+    def accept(self, old: Point, new: Point) -> None:
+        """Store the pair and count the iteration."""
+        super().accept(old, new)
+        self._iterations += 1
+
+    def end_solve(self) -> None:
+        """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
+        iterations = self._iterations - self._marked_at
+        self._solves += 1
+        self._stale = iterations > (self.kappa + self._spent + iterations) / self._solves
+        self._spent += iterations
+
+    def recover(self, problem: StageProblem, point: Point) -> bool:
+        """Drop the pairs; then make a new, projected factor here, at most three times a solve."""
+        if super().recover(problem, point):
+            return True
+        if self._rescues == MAX_RESCUES:
+            return False
+        self._rescues += 1
+        self._refactor(problem, point, "always")
+        return True
+
+    def save(self) -> dict[str, FloatArray]:
+        """What the factor was made of, and the account of its use."""
+        if self._reference is None or self._kind is None:
+            return {}
+        account = np.array([*self._kind, self._solves, self._spent, self._stale], dtype=np.float64)
+        return {"matrix": self.factor.matrix_values(), "reference": self._reference, "account": account}
+
+    def load(self, arrays: dict[str, FloatArray]) -> None:
+        """Take it back, and factorise again."""
+        self._reference = arrays.get("reference")
+        if self._reference is None:
+            return
+        c, inertial, solves, spent, stale = arrays["account"]
+        self._kind, self._solves, self._spent, self._stale = (c, bool(inertial)), int(solves), int(spent), bool(stale)
+        self.factor.restore(arrays["matrix"])
+        self.inverse.reset()
+
+    def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
+        self.factor.update(problem, point.x, projection)
+        self.inverse.reset()
+        self.history.clear()
+        self._reference, self._kind = point.x, _kind(problem)
+        self._solves = self._spent = 0
+        self._stale = False
+        self._mark(point)
+
+    def _mark(self, point: Point) -> None:
+        """Measure contraction from here on."""
+        self._marked_at, self._marked = self._iterations, point.residual
+
+    def _needed(self, point: Point) -> float:
+        """Iterations that are still to come, at the mean contraction so far; 0 while there is too little to tell."""
+        done = self._iterations - self._marked_at
+        if done < PATIENCE:
+            return 0.0
+        rate = log(point.residual / self._marked) / done
+        return log(self._goal / point.residual) / rate if rate < 0 else inf
+
+
+def _kind(problem: StageProblem) -> tuple[float, bool]:
+    return problem.stage.c, problem.stage.inertial
