@@ -4,7 +4,7 @@
 
 #include "elements/dispatch.hpp"
 #include "elements/elastic_energy.hpp"
-#include "elements/nodal_rotations.hpp"
+#include "elements/tet_geometry.hpp"
 #include "energies/inertia.hpp"
 #include "energies/viscosity.hpp"
 
@@ -51,6 +51,26 @@ void bind_energies(nb::module_& m) {
           [](TetBlocks* self, const Array<const double>& rest, const Array<const std::int32_t>& tets,
              const BlockPattern& pattern) { new (self) TetBlocks(view(rest), view(tets), pattern); },
           nb::arg("rest_positions"), nb::arg("tets"), nb::arg("pattern"));
+
+  nb::class_<TetGeometry>(m, "TetGeometry", "What a deformation is like, without any material.")
+      .def(
+          "__init__",
+          [](TetGeometry* self, std::shared_ptr<TetBlocks> blocks, int threads) {
+            new (self) TetGeometry(std::move(blocks), threads);
+          },
+          nb::arg("blocks"), nb::arg("threads"))
+      .def(
+          "least_J",
+          [](TetGeometry& g, const Array<const double>& x) { return g.least_J(sized(x, 3 * g.nodes(), "x")); },
+          nb::arg("x"), ReleaseGil())
+      .def(
+          "rotations",
+          [](TetGeometry& g, const Array<const double>& x, const Array<const double>& reference,
+             const Array<double>& rotations) {
+            g.rotations(sized(x, 3 * g.nodes(), "x"), sized(reference, 3 * g.nodes(), "reference"),
+                        sized(rotations, 9 * g.nodes(), "rotations"));
+          },
+          nb::arg("x"), nb::arg("reference"), nb::arg("rotations").noconvert(), ReleaseGil());
 
   nb::class_<ElasticEnergy>(m, "ElasticEnergy")
       .def(
@@ -110,17 +130,6 @@ void bind_energies(nb::module_& m) {
           },
           nb::arg("x"), nb::arg("target"), nb::arg("scale"), nb::arg("gradient").noconvert(), ReleaseGil())
       .def("add_hessian", &Inertia::add_hessian, nb::arg("scale"), nb::arg("matrix"), ReleaseGil());
-
-  m.def(
-      "nodal_rotations",
-      [](std::shared_ptr<TetBlocks> blocks, const Array<const double>& x, const Array<const double>& reference,
-         const Array<double>& rotations, int threads) {
-        NodalRotations geometry(std::move(blocks), threads);
-        geometry.compute(sized(x, 3 * geometry.nodes(), "x"), sized(reference, 3 * geometry.nodes(), "reference"),
-                         sized(rotations, 9 * geometry.nodes(), "rotations"));
-      },
-      nb::arg("blocks"), nb::arg("x"), nb::arg("reference"), nb::arg("rotations").noconvert(), nb::arg("threads"),
-      ReleaseGil());
 
   m.def("evaluate_density", &evaluate_density, nb::arg("material"), nb::arg("F"), nb::arg("parameters"),
         nb::arg("project"), nb::arg("energy").noconvert(), nb::arg("stress").noconvert(),

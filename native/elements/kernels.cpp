@@ -3,7 +3,7 @@
 #include "elements/kernels.hpp"
 
 #include "elements/element_loop.hpp"
-#include "elements/rotation_kernels.hpp"
+#include "elements/geometry_kernels.hpp"
 #include "materials/all.hpp"
 #include "simd/arch.hpp"
 
@@ -13,7 +13,7 @@ namespace {
 template <template <class> class... M>
 const KernelSet& kernel_set(MaterialList<M...>) {
   static const MaterialKernels materials[] = {make_kernels<Vec, M>()..., MaterialKernels{}};
-  static const KernelSet set = {materials, {chunk_correlations<Vec>, nearest_rotations<Vec>}};
+  static const KernelSet set = {materials, {chunk_least_J<Vec>, chunk_correlations<Vec>, nearest_rotations<Vec>}};
   return set;
 }
 

@@ -33,8 +33,9 @@ struct MaterialKernels {
                   double* stiffness);
 };
 
-// Kernels of the geometry alone (rotation_kernels.hpp).
+// Kernels of the geometry alone (geometry_kernels.hpp).
 struct GeometryKernels {
+  double (*least_J)(const ChunkData&, const double* x, double* scratch);
   void (*correlations)(const ChunkData&, const double* x, const double* reference, double* scratch, double* slot_sums);
   void (*nearest_rotations)(double* matrices, std::int64_t count);
 };

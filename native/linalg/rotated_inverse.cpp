@@ -17,7 +17,7 @@ RotatedInverse::RotatedInverse(std::shared_ptr<InverseOperator> inner, std::shar
 }
 
 void RotatedInverse::turn(const double* x, const double* reference) {
-  geometry_.compute(x, reference, rotations_.data());
+  geometry_.rotations(x, reference, rotations_.data());
   for (const std::int64_t i : held_nodes_)
     for (int k = 0; k < 9; ++k) rotations_[9 * i + k] = k % 4 == 0 ? 1.0 : 0.0;
   turned_ = true;

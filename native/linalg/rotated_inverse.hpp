@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "elements/nodal_rotations.hpp"
+#include "elements/tet_geometry.hpp"
 #include "linalg/cholesky.hpp"
 
 namespace qlb {
@@ -26,7 +26,7 @@ class RotatedInverse : public InverseOperator {
 
  private:
   std::shared_ptr<InverseOperator> inner_;
-  NodalRotations geometry_;
+  TetGeometry geometry_;
   std::vector<std::int64_t> held_nodes_;
   int threads_;
   bool turned_ = false;

@@ -31,6 +31,7 @@ class QLA(FactoredLbfgs):
     defaults: ClassVar[dict[str, object]] = {
         "projection": "on-demand",
         "initial_guess": "predictor",
+        "max_iterations": 2000,
         "window": 8,
     }
 
@@ -107,7 +108,8 @@ class QLA(FactoredLbfgs):
         self.inverse.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
-        self.factor.update(problem, point.x, projection)
+        inverted = projection == "on-demand" and problem.system.is_inverted(point.x)
+        self.factor.update(problem, point.x, "always" if inverted else projection)
         self.inverse.reset()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)

@@ -19,7 +19,12 @@ class Descent(ABC):
     """A descent method: a subclass says which direction to search, and what to do when a search fails."""
 
     name: ClassVar[str]
-    defaults: ClassVar[dict[str, object]] = {"projection": "always", "initial_guess": "previous", "window": 5}
+    defaults: ClassVar[dict[str, object]] = {
+        "projection": "always",
+        "initial_guess": "previous",
+        "max_iterations": 500,
+        "window": 5,
+    }
     """What a setting is where the user gives none."""
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
@@ -115,8 +120,8 @@ class Descent(ABC):
         return reason
 
     def _initial_point(self, problem: StageProblem) -> Point:
-        """x_k, or the predictor where it is asked for and its energy is finite."""
-        if self.settings.initial_guess == "predictor":
+        """x_k, or the predictor where it is asked for, inverts no tet, and has a finite energy."""
+        if self.settings.initial_guess == "predictor" and not problem.system.is_inverted(problem.predictor):
             guess = Point.at(problem, problem.predictor)
             if guess.is_finite:
                 return guess

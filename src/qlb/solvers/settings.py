@@ -38,7 +38,9 @@ class SolverSettings(Settings):
         description="Where a solve starts: previous, that is x_k (default of ND, QLF, QLB), or the predictor from"
         " velocity and acceleration (default of QLA)",
     )
-    max_iterations: int = quantity(500, "Nonlinear iterations of one solve before it counts as failed", ge=1)
+    max_iterations: int | None = quantity(
+        None, "Nonlinear iterations of one solve before it counts as failed: 500, in QLA 2000", ge=1
+    )
     window: int | None = quantity(None, "Pairs that L-BFGS keeps: 5 in QLF and QLB, 8 in QLA", ge=1, le=100)
     keep_factor: bool = Field(True, description="Keep the factor over steps while that pays (QLA)")
     rotate_factor: bool = Field(True, description="Carry the factor along with the rotation of the material (QLA)")
@@ -55,4 +57,5 @@ class CompleteSettings(SolverSettings):
 
     projection: Projection
     initial_guess: InitialGuess
+    max_iterations: int
     window: int

@@ -26,6 +26,7 @@ class System:
 
     Attributes:
         blocks: the tets as the compiled kernels take them.
+        geometry: what a deformation is like, without any material.
         elastic: the elastic energy of the material [J].
         potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
         terms: what has another potential in each stage: loads, damping.
@@ -56,6 +57,7 @@ class System:
         self.threads = threads
         self.pattern = _native.BlockPattern(len(mesh.positions), _cliques(mesh, energies))
         self.blocks = blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
+        self.geometry = _native.TetGeometry(blocks, threads)
         material = material.on(mesh)
         parameters = material.parameter_table(len(mesh.tets))
         self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
@@ -100,6 +102,10 @@ class System:
         """Zero the entries of `gradient` (n, 3) that belong to held degrees of freedom, in place."""
         gradient.reshape(-1)[self._fixed] = 0.0
         return gradient
+
+    def is_inverted(self, x: FloatArray) -> bool:
+        """Whether a tet is turned inside out, flat, or not a number, at positions `x` (n, 3) [m]."""
+        return not self.geometry.least_J(x) > 0
 
     def dot(self, a: FloatArray, b: FloatArray) -> float:
         """Inner product, the same bits for any number of threads."""

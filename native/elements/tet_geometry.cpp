@@ -1,4 +1,4 @@
-#include "elements/nodal_rotations.hpp"
+#include "elements/tet_geometry.hpp"
 
 #include <algorithm>
 
@@ -7,13 +7,27 @@
 
 namespace qlb {
 
-NodalRotations::NodalRotations(std::shared_ptr<const TetBlocks> blocks, int threads)
+TetGeometry::TetGeometry(std::shared_ptr<const TetBlocks> blocks, int threads)
     : blocks_(std::move(blocks)), kernels_(&geometry_kernels()), threads_(threads) {
   positions_.resize(2 * kStride * blocks_->slot_node.size());
   slot_sums_.resize(9 * blocks_->slot_node.size());
 }
 
-void NodalRotations::compute(const double* x, const double* reference, double* rotations) {
+double TetGeometry::least_J(const double* x) {
+  const auto chunks = static_cast<std::int64_t>(blocks_->chunks.size());
+  std::vector<double> least(chunks);
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+  for (std::int64_t k = 0; k < chunks; ++k) {
+    const Chunk& chunk = blocks_->chunks[k];
+    double* scratch = positions_.data() + 2 * kStride * chunk.first_slot;
+    least[k] = kernels_->least_J(chunk_geometry(*blocks_, chunk), x, scratch);
+  }
+  double result = least[0];
+  for (const double J : least) result = J < result || J != J ? J : result;
+  return result;
+}
+
+void TetGeometry::rotations(const double* x, const double* reference, double* rotations) {
   const auto chunks = static_cast<std::int64_t>(blocks_->chunks.size());
 #pragma omp parallel for schedule(dynamic) num_threads(threads_)
   for (std::int64_t k = 0; k < chunks; ++k) {

@@ -1,10 +1,27 @@
-// How far the material at each node has turned from one configuration to another.
+// What a deformation is like: its least change of volume, and how far the material at each node has turned.
 #pragma once
 
 #include "elements/element_loop.hpp"
 #include "simd/polar3.hpp"
 
 namespace qlb {
+
+// The least J = det F of the elements; NaN where one is not a number.
+template <class V>
+double chunk_least_J(const ChunkData& chunk, const double* x, double* scratch) {
+  load_positions(chunk, x, scratch);
+  V least(std::numeric_limits<double>::infinity());
+  for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
+    for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
+      const V J = determinant(Tets<V>(chunk, pack, lane).deformation_gradient(scratch));
+      least = xsimd::select((J < least) | !(J == J), J, least);  // NaN stays
+    }
+  alignas(64) double lanes[V::size];
+  least.store_aligned(lanes);
+  double result = lanes[0];
+  for (std::size_t l = 1; l < V::size; ++l) result = lanes[l] < result || lanes[l] != lanes[l] ? lanes[l] : result;
+  return result;
+}
 
 // slot_sums (slots, 3, 3), overwritten: sum of volume F(x) F(reference)^T over the elements at each slot.
 // `scratch` holds 2 * kStride * slots doubles.

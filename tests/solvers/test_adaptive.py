@@ -1,0 +1,191 @@
+"""QLA: when its factor is kept, turned and made anew, and that it gets through what defeats the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+
+import numpy as np
+import pytest
+
+from qlb import Rotation, Simulation, SolverSettings, StableNeoHookean, State, StVenantKirchhoff, TetMesh
+from qlb.solvers.adaptive import PATIENCE, QLA
+from qlb.solvers.line_search import Point
+from tests.solvers.problems import bar_system, crushed, make_solver, problem_of, swinging
+from tests.support import Array, dense, left_end, make_system, random_rotation, right_end, small_bar
+
+
+def bar(cells: tuple[int, int, int] = (8, 2, 2), **arguments: object) -> Simulation:
+    mesh = TetMesh.box((1.0, 0.25, 0.25), cells=cells)
+    defaults: dict[str, object] = {"material": StableNeoHookean(), "solver": "QLA", "threads": 1}
+    simulation = Simulation(mesh, **(defaults | arguments))  # type: ignore[arg-type]
+    simulation.pin(left_end(mesh))
+    return simulation
+
+
+def adaptive(system: object, **settings: object) -> QLA:
+    solver = make_solver("QLA", system, **settings)  # type: ignore[arg-type]
+    assert isinstance(solver, QLA)
+    return solver
+
+
+def test_a_factor_lives_over_several_steps() -> None:
+    simulation = bar()
+    results = list(simulation.run(60))
+    factors = sum(result.factorizations for result in results)
+    assert factors <= 60 / 3
+    assert all(result.converged for result in results)
+
+
+def test_both_stages_of_sdirk2_use_one_factor() -> None:
+    results = list(bar(integrator="SDIRK2").run(20))
+    assert sum(result.factorizations for result in results) <= 20 / 2
+
+
+@pytest.mark.parametrize(
+    ("settings", "at_least"), [({"keep_factor": False}, 1.0), ({"rotate_factor": False}, 0.0), ({}, 0.0)]
+)
+def test_without_the_kept_factor_there_is_one_a_solve(settings: dict[str, object], at_least: float) -> None:
+    results = list(bar(solver_settings=SolverSettings(**settings)).run(20))  # type: ignore[arg-type]
+    factors = [solve.factorizations for result in results[1:] for solve in result.solves]
+    assert np.mean(factors) >= at_least
+
+
+def test_turning_the_factor_saves_factors_and_iterations() -> None:
+    work = []
+    for turned in (True, False):
+        simulation = bar(solver_settings=SolverSettings(rotate_factor=turned))
+        simulation.move(right_end(simulation.mesh), Rotation((1.0, 0.0, 0.0), (1.0, 0.125, 0.125), rate=1.0))
+        results = list(simulation.run(40))
+        work.append([sum(r.iterations for r in results), sum(r.factorizations for r in results)])
+    assert work[0][0] < work[1][0]
+    assert work[0][1] < work[1][1]
+
+
+def test_the_turned_factor_of_a_free_body_is_that_of_the_turned_body(rng: np.random.Generator) -> None:
+    # H(Q x) = Q H(x) Q^T for an objective energy and an isotropic mass.
+    system = make_system(small_bar((3, 1, 1)), gravity=(0.0, 0.0, 0.0))
+    x = system.mesh.positions + 0.01 * rng.normal(size=system.mesh.positions.shape)
+    Q = random_rotation(rng)
+    problem, turned = (problem_of(system, State(0.0, y, np.zeros_like(y)), h=0.01) for y in (x, x @ Q.T))
+    solver = adaptive(system)
+    solver.begin_solve(problem, Point.at(problem, x), 0.0)
+    point = Point.at(turned, x @ Q.T)
+    solver.begin_solve(turned, point, 0.0)
+    b, found = rng.normal(size=x.shape), np.empty_like(x)
+    solver.inverse.apply(b, found)
+    exact = np.linalg.solve(dense(turned.hessian(point.x, project=False), system.pattern), b.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+    assert solver.factor.count == 1
+
+
+def test_nodal_rotations_and_least_volume_ratio_are_those_of_numpy(rng: np.random.Generator) -> None:
+    system = make_system(small_bar((3, 2, 1)))
+    mesh = system.mesh
+    x, reference = (mesh.positions + 0.03 * rng.normal(size=mesh.positions.shape) for _ in range(2))
+    gradients = [_deformation_gradients(mesh, y) for y in (x, reference)]
+    sums = np.zeros((len(x), 3, 3))
+    correlation = mesh.volumes()[:, None, None] * gradients[0] @ gradients[1].transpose(0, 2, 1)
+    for corner in mesh.tets.T:
+        np.add.at(sums, corner, correlation)
+    U, _, Vt = np.linalg.svd(sums)
+    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
+    found = np.empty((len(x), 3, 3))
+    system.geometry.rotations(x, reference, found)
+    np.testing.assert_allclose(found, U @ Vt, atol=1e-12)
+    assert system.geometry.least_J(x) == pytest.approx(np.linalg.det(gradients[0]).min(), rel=1e-12)
+
+
+def _deformation_gradients(mesh: TetMesh, x: Array) -> Array:
+    rest, now = (y[mesh.tets[:, 1:]] - y[mesh.tets[:, :1]] for y in (mesh.positions, x))
+    return np.asarray(np.linalg.solve(rest, now).transpose(0, 2, 1))
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_an_inverted_or_broken_state_is_seen(inverted: bool, rng: np.random.Generator) -> None:
+    system = bar_system()
+    state = crushed(system, rng) if inverted else swinging(system)
+    assert system.is_inverted(state.positions) == inverted
+    broken = state.positions.copy()
+    broken[3, 1] = np.nan
+    assert system.is_inverted(broken)
+
+
+def test_a_predictor_that_inverts_tets_is_not_taken(rng: np.random.Generator) -> None:
+    system = bar_system()
+    state = State(0.0, system.mesh.positions, 20.0 * rng.normal(size=system.mesh.positions.shape))
+    problem = problem_of(system, state)
+    assert system.is_inverted(problem.predictor)
+    assert adaptive(system)._initial_point(problem).x is problem.start
+
+
+def test_at_an_inverted_state_the_factor_is_projected_at_once(rng: np.random.Generator) -> None:
+    system = bar_system()
+    problem = problem_of(system, crushed(system, rng))
+    solver = adaptive(system)
+    solver.begin_solve(problem, Point.at(problem, problem.start), 0.0)
+    assert solver.factor.projected
+    assert solver.factor.count == 1
+
+
+def test_a_solve_dearer_than_the_mean_calls_for_a_new_factor() -> None:
+    solver = adaptive(bar_system())
+    solver.kappa = 10.0
+    for iterations, stale in ((4, False), (4, False), (6, False), (9, True)):  # means: 14, 9, 8, 33/4
+        solver._iterations, solver._marked_at = iterations, 0
+        solver.end_solve()
+        assert solver._stale == stale
+
+
+def test_the_iterations_to_come_are_those_of_the_mean_contraction() -> None:
+    system = bar_system()
+    solver = adaptive(system)
+    point = Point(np.zeros((1, 3)), 0.0, np.zeros((1, 3)), 1e-3)
+    solver._goal, solver._marked, solver._marked_at = 1e-6, 1.0, 2
+    solver._iterations = 2 + PATIENCE - 1
+    assert solver._needed(point) == 0.0
+    solver._iterations = 2 + 6  # 1e-3 in six: another six
+    assert solver._needed(point) == pytest.approx(6.0)
+    solver._marked = 1e-4
+    assert solver._needed(point) == inf
+
+
+HARD: dict[str, Callable[[], Simulation]] = {
+    "nearly incompressible": lambda: bar(material=StableNeoHookean(poisson=0.499)),
+    "large steps, BDF2": lambda: bar(step=5e-2),
+    "large steps, BDF1": lambda: bar(step=0.1, integrator="BDF1"),
+    "fast twist": lambda: _moved(Rotation((1.0, 0.0, 0.0), (1.0, 0.125, 0.125), rate=4.0)),
+    "quasistatic": lambda: bar(
+        integrator="quasistatic", step=0.05, gravity=lambda t: np.array([0.0, -9.81 * min(t, 1.0), 0.0])
+    ),
+    "squashed": lambda: _moved(_squash, StableNeoHookean(poisson=0.45), integrator="quasistatic", step=0.05),
+    "squashed StVK": lambda: _moved(_squash, StVenantKirchhoff(poisson=0.45), integrator="quasistatic", step=0.05),
+    "flattened": lambda: _started(lambda x, rng: np.column_stack([x[:, 0], np.full(len(x), 0.125), x[:, 2]])),
+    "random": lambda: _started(lambda x, rng: rng.uniform(0.0, 1.0, x.shape)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", HARD.values(), ids=HARD)
+def test_no_step_fails_in_hard_cases(case: Callable[[], Simulation]) -> None:
+    results = list(case().run(20))
+    assert all(result.converged for result in results)
+
+
+def _squash(anchors: Array, time: float) -> Array:
+    return anchors - np.array([0.6 * min(time, 1.0), 0.0, 0.0])
+
+
+def _moved(motion: Callable[[Array, float], Array], material: object = None, **arguments: object) -> Simulation:
+    simulation = bar(material=material or StableNeoHookean(), gravity=(0.0, 0.0, 0.0), **arguments)
+    simulation.move(right_end(simulation.mesh), motion)
+    return simulation
+
+
+def _started(placed: Callable[[Array, np.random.Generator], Array]) -> Simulation:
+    simulation = bar(gravity=(0.0, 0.0, 0.0))
+    x = placed(simulation.mesh.positions, np.random.default_rng(1))
+    held = left_end(simulation.mesh)
+    x[held] = simulation.mesh.positions[held]
+    simulation.restore(State(0.0, x, np.zeros_like(x)), 0, {})
+    return simulation
