@@ -154,26 +154,32 @@ void contract_spectrum(const Spectrum<V>& S, const Svd3<V>& svd, const Tets<V>& 
     same[k] = V(0.5) * (S.flip[k] + S.twist[k]);
     mixed[k] = V(0.5) * (S.flip[k] - S.twist[k]);
   }
-  Vec3<V> g[3];
-  for (int a = 0; a < 3; ++a) g[a] = transpose_times(svd.R, tets.shape_gradient(a + 1));
+  Vec3<V> g[3], weighted[3];
+  for (int a = 0; a < 3; ++a) {
+    g[a] = transpose_times(svd.R, tets.shape_gradient(a + 1));
+    weighted[a] = {tets.volume * g[a][0], tets.volume * g[a][1], tets.volume * g[a][2]};
+  }
   for (int b = 0; b < 3; ++b)
     for (int a = 0; a <= b; ++a) {
+      const Vec3<V>& w = weighted[a];
       Mat3<V> local;
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
           if (i == j) {
             const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-            local(i, i) =
-                S.scaling(i, i) * g[a][i] * g[b][i] + same[i2] * g[a][i1] * g[b][i1] + same[i1] * g[a][i2] * g[b][i2];
+            local(i, i) = S.scaling(i, i) * w[i] * g[b][i] + same[i2] * w[i1] * g[b][i1] + same[i1] * w[i2] * g[b][i2];
           } else {
-            local(i, j) = S.scaling(i, j) * g[a][i] * g[b][j] + mixed[3 - i - j] * g[a][j] * g[b][i];
+            local(i, j) = S.scaling(i, j) * w[i] * g[b][j] + mixed[3 - i - j] * w[j] * g[b][i];
           }
-          local(i, j) *= tets.volume;
         }
       const Mat3<V> left = svd.U * local;
       for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          H[a][b](i, j) = left(i, 0) * svd.U(j, 0) + left(i, 1) * svd.U(j, 1) + left(i, 2) * svd.U(j, 2);
+        for (int j = 0; j < 3; ++j) {
+          if (a == b && j < i)  // symmetric
+            H[a][b](i, j) = H[a][b](j, i);
+          else
+            H[a][b](i, j) = left(i, 0) * svd.U(j, 0) + left(i, 1) * svd.U(j, 1) + left(i, 2) * svd.U(j, 2);
+        }
     }
 }
 
