@@ -13,5 +13,8 @@ std::vector<std::string> simd_levels();
 // Throws std::invalid_argument for a material or a level that is not there; an empty level means the best.
 const MaterialKernels& find_kernels(const std::string& material, const std::string& level = "");
 std::vector<std::string> material_names();
+// Parameters of each element. Throws std::invalid_argument where a program is missing, or given to a material that
+// takes none.
+int parameter_count(const MaterialKernels& kernels, const Program* program);
 
 }  // namespace qlb

@@ -8,6 +8,7 @@
 #include "materials/mooney_rivlin.hpp"
 #include "materials/st_venant_kirchhoff.hpp"
 #include "materials/stable_neo_hookean.hpp"
+#include "materials/symbolic.hpp"
 
 namespace qlb {
 
@@ -15,6 +16,6 @@ template <template <class> class... Materials>
 struct MaterialList {};
 
 using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean, FixedCorotational, Arap,
-                                  MooneyRivlin, LinearElastic, FibreSqrtI5, FibreStVK>;
+                                  MooneyRivlin, LinearElastic, FibreSqrtI5, FibreStVK, Symbolic, SymbolicWithI2>;
 
 }  // namespace qlb

@@ -18,6 +18,7 @@ from qlb.materials import (
     MooneyRivlin,
     StableNeoHookean,
     StVenantKirchhoff,
+    SymbolicMaterial,
 )
 from qlb.mesh import TetMesh
 from qlb.simulation import Simulation, StepFailed, StepResult
@@ -44,6 +45,7 @@ __all__ = [
     "State",
     "StepFailed",
     "StepResult",
+    "SymbolicMaterial",
     "TetMesh",
     "Tolerance",
     "Translation",
