@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from time import perf_counter
 
 import numpy as np
+import sympy
 
 import qlb
 from benchmarks.machine import machine_line, markdown
@@ -29,23 +31,34 @@ def element_table(threads: list[int], cells: tuple[int, int, int] = (82, 20, 20)
     count = len(mesh.tets)
     pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
     blocks = _native.TetBlocks(mesh.positions, mesh.tets, pattern)
-    parameters = qlb.StableNeoHookean().parameter_table(count)
+    snh = qlb.StableNeoHookean()
+    materials = {"SNH": snh, "SNH, symbolic": symbolic_stable_neo_hookean(snh)}
     x = mesh.positions + 1e-3 * np.random.default_rng(0).standard_normal(mesh.positions.shape)
     gradient, matrix = np.zeros_like(x), _native.BlockMatrix(pattern)
     rows = []
     for workers in threads:
-        for level in _native.simd_levels():
-            energy = _native.ElasticEnergy(blocks, "SNH", parameters, workers, level)
+        for level, (name, material) in product(_native.simd_levels(), materials.items()):
+            table = material.parameter_table(count)
+            energy = _native.ElasticEnergy(blocks, material.kernels, table, workers, level, material.program())
             seconds = [
                 best_seconds(lambda e=energy: e.value(x)),
                 best_seconds(lambda e=energy: e.add_value_gradient(x, 1.0, gradient)),
                 best_seconds(lambda e=energy: e.add_hessian(x, 1.0, False, matrix)),
                 best_seconds(lambda e=energy: e.add_hessian(x, 1.0, True, matrix)),
             ]
-            rows.append([str(workers), level, *(f"{1e9 * s / count:.1f}" for s in seconds)])
-    header = ["threads", "SIMD", "energy", "energy + gradient", "Hessian", "Hessian, projected"]
+            rows.append([str(workers), level, name, *(f"{1e9 * s / count:.1f}" for s in seconds)])
+    header = ["threads", "SIMD", "material", "energy", "energy + gradient", "Hessian", "Hessian, projected"]
     where = machine_line(max(threads))
-    return f"### Element kernels, ns per tet\n\nSNH, {count} tets. {where}.\n\n{markdown(header, rows)}"
+    return f"### Element kernels, ns per tet\n\n{count} tets. {where}.\n\n{markdown(header, rows)}"
+
+
+def symbolic_stable_neo_hookean(built_in: qlb.StableNeoHookean) -> qlb.SymbolicMaterial:
+    """The same material, interpreted from its SymPy expression."""
+    I1, _, J = qlb.SymbolicMaterial.invariants
+    mu, lam = sympy.symbols("mu lam", positive=True)
+    alpha = 1 + sympy.Rational(3, 4) * mu / lam
+    psi = mu / 2 * (I1 - 3) + lam / 2 * (J - alpha) ** 2 - mu / 2 * sympy.log(I1 + 1)
+    return qlb.SymbolicMaterial(psi=psi, parameters=dict(zip(("mu", "lam"), built_in.kernel_parameters(), strict=True)))
 
 
 def factor_table(threads: list[int], sizes: list[str]) -> str:

@@ -38,5 +38,6 @@ using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 void bind_assembly(nb::module_& m);
 void bind_energies(nb::module_& m);
 void bind_linalg(nb::module_& m);
+void bind_program(nb::module_& m);
 
 }  // namespace qlb

@@ -7,6 +7,7 @@
 #include "elements/tet_geometry.hpp"
 #include "energies/inertia.hpp"
 #include "energies/viscosity.hpp"
+#include "materials/owned_program.hpp"
 
 namespace qlb {
 namespace {
@@ -15,10 +16,12 @@ namespace {
 // (count, 81).
 void evaluate_density(const std::string& material, const Array<const double>& F, const Array<const double>& parameters,
                       bool project, const Array<double>& energy, const Array<double>& stress,
-                      const Array<double>& stiffness, const std::string& simd_level) {
+                      const Array<double>& stiffness, const std::string& simd_level,
+                      std::shared_ptr<OwnedProgram> owned) {
   const MaterialKernels& kernels = find_kernels(material, simd_level);
   const auto count = static_cast<std::int64_t>(F.size()) / 9;
-  const int width = kernels.parameter_count;
+  const Program* program = owned ? &owned->view() : nullptr;
+  const int width = parameter_count(kernels, program);
   sized(parameters, count * width, "parameters");
   sized(energy, count, "energy");
   sized(stress, 9 * count, "stress");
@@ -32,7 +35,7 @@ void evaluate_density(const std::string& material, const Array<const double>& F,
       for (int k = 0; k < 9; ++k) in[k * kLanes + l] = F.data()[9 * e + k];
       for (int k = 0; k < width; ++k) par[k * kLanes + l] = parameters.data()[width * e + k];
     }
-    kernels.density(in.data(), par.data(), project, psi.data(), P.data(), C.data());
+    kernels.density(in.data(), par.data(), program, project, psi.data(), P.data(), C.data());
     for (int l = 0; l < lanes; ++l) {
       const std::int64_t e = first + l;
       energy.data()[e] = psi[l];
@@ -76,10 +79,13 @@ void bind_energies(nb::module_& m) {
       .def(
           "__init__",
           [](ElasticEnergy* self, std::shared_ptr<TetBlocks> blocks, const std::string& material,
-             const Array<const double>& parameters, int threads, const std::string& simd_level) {
-            new (self) ElasticEnergy(std::move(blocks), material, view(parameters), threads, simd_level);
+             const Array<const double>& parameters, int threads, const std::string& simd_level,
+             std::shared_ptr<OwnedProgram> program) {
+            new (self)
+                ElasticEnergy(std::move(blocks), material, view(parameters), threads, simd_level, std::move(program));
           },
-          nb::arg("blocks"), nb::arg("material"), nb::arg("parameters"), nb::arg("threads"), nb::arg("simd_level") = "")
+          nb::arg("blocks"), nb::arg("material"), nb::arg("parameters"), nb::arg("threads"), nb::arg("simd_level") = "",
+          nb::arg("program") = nb::none())
       .def(
           "value", [](ElasticEnergy& e, const Array<const double>& x) { return e.value(sized(x, 3 * e.nodes(), "x")); },
           nb::arg("x"), ReleaseGil())
@@ -133,7 +139,7 @@ void bind_energies(nb::module_& m) {
 
   m.def("evaluate_density", &evaluate_density, nb::arg("material"), nb::arg("F"), nb::arg("parameters"),
         nb::arg("project"), nb::arg("energy").noconvert(), nb::arg("stress").noconvert(),
-        nb::arg("stiffness").noconvert(), nb::arg("simd_level") = "");
+        nb::arg("stiffness").noconvert(), nb::arg("simd_level") = "", nb::arg("program") = nb::none());
 }
 
 }  // namespace qlb

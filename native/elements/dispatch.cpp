@@ -58,4 +58,12 @@ std::vector<std::string> material_names() {
   return names;
 }
 
+int parameter_count(const MaterialKernels& kernels, const Program* program) {
+  const bool takes_program = kernels.parameter_count == kAsProgram;
+  if (takes_program != (program != nullptr))
+    throw std::invalid_argument("material '" + std::string(kernels.name) +
+                                (takes_program ? "' needs a program" : "' takes no program"));
+  return takes_program ? program->parameter_count : kernels.parameter_count;
+}
+
 }  // namespace qlb

@@ -15,5 +15,8 @@ const MaterialKernels& find_kernels(const std::string& material, const std::stri
 // Those of the best level.
 const GeometryKernels& geometry_kernels();
 std::vector<std::string> material_names();
+// Parameters of each element. Throws std::invalid_argument where a program is missing, or given to a material that
+// takes none.
+int parameter_count(const MaterialKernels& kernels, const Program* program);
 
 }  // namespace qlb

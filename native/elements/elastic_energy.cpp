@@ -18,15 +18,17 @@ int threads_worth(std::size_t chunks, int threads) {
 }  // namespace
 
 ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
-                             std::span<const double> parameters, int threads, const std::string& simd_level)
+                             std::span<const double> parameters, int threads, const std::string& simd_level,
+                             std::shared_ptr<const OwnedProgram> program)
     : blocks_(std::move(blocks)),
       kernels_(&find_kernels(material, simd_level)),
+      program_(std::move(program)),
+      parameter_count_(parameter_count(*kernels_, this->program())),
       threads_(threads_worth(blocks_->chunks.size(), threads)) {
-  const std::int64_t count = kernels_->parameter_count;
-  if (static_cast<std::int64_t>(parameters.size()) != blocks_->elements * count)
-    throw std::invalid_argument("material '" + material + "' takes " + std::to_string(count) +
+  if (static_cast<std::int64_t>(parameters.size()) != blocks_->elements * parameter_count_)
+    throw std::invalid_argument("material '" + material + "' takes " + std::to_string(parameter_count_) +
                                 " parameters per element");
-  parameters_ = blocks_->scatter(parameters, count);
+  parameters_ = blocks_->scatter(parameters, parameter_count_);
   positions_.resize(kStride * blocks_->slot_node.size());
   slot_gradient_.resize(kStride * blocks_->slot_node.size());
   chunk_energy_.resize(blocks_->chunks.size());
@@ -34,7 +36,8 @@ ElasticEnergy::ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std:
 
 ChunkData ElasticEnergy::chunk_data(const Chunk& c) const {
   ChunkData data = chunk_geometry(*blocks_, c);
-  data.parameters = parameters_.data() + c.first_pack * kernels_->parameter_count * kLanes;
+  data.parameters = parameters_.data() + c.first_pack * parameter_count_ * kLanes;
+  data.program = program();
   return data;
 }
 

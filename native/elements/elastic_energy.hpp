@@ -8,14 +8,16 @@
 #include "assembly/block_matrix.hpp"
 #include "elements/kernels.hpp"
 #include "elements/tet_blocks.hpp"
+#include "materials/owned_program.hpp"
 
 namespace qlb {
 
 class ElasticEnergy {
  public:
-  // parameters (elements, count) as the material wants them.
+  // parameters (elements, count) as the material wants them; a program for a material that takes one.
   ElasticEnergy(std::shared_ptr<const TetBlocks> blocks, const std::string& material,
-                std::span<const double> parameters, int threads, const std::string& simd_level);
+                std::span<const double> parameters, int threads, const std::string& simd_level,
+                std::shared_ptr<const OwnedProgram> program);
 
   double value(const double* x);  // [J]
   // gradient += scale dPsi/dx; returns scale Psi.
@@ -28,6 +30,7 @@ class ElasticEnergy {
   double* parameters() { return parameters_.data(); }  // (packs, count, kLanes)
 
  private:
+  const Program* program() const { return program_ ? &program_->view() : nullptr; }
   ChunkData chunk_data(const Chunk& chunk) const;
   // kernel(chunk, data, scratch) over all chunks in parallel.
   template <class Kernel>
@@ -35,6 +38,8 @@ class ElasticEnergy {
 
   std::shared_ptr<const TetBlocks> blocks_;
   const MaterialKernels* kernels_;
+  std::shared_ptr<const OwnedProgram> program_;  // may be null
+  std::int64_t parameter_count_;
   Aligned<double> parameters_;
   int threads_;
   Aligned<double> positions_;      // (slots, kStride)

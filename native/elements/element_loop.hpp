@@ -40,20 +40,34 @@ struct Tets {
   Vec3<V> shape_gradient(int a) const { return {Dm_inverse(a - 1, 0), Dm_inverse(a - 1, 1), Dm_inverse(a - 1, 2)}; }
 };
 
+// The material of V::size elements whose parameters (count, kLanes) start at `lanes`.
 template <class M, class V>
-M load_material(const ChunkData& chunk, std::int64_t pack, int lane) {
-  V parameters[M::parameter_count];
-  for (int k = 0; k < M::parameter_count; ++k)
-    parameters[k] = V::load_aligned(chunk.parameters + (pack * M::parameter_count + k) * kLanes + lane);
-  return M(parameters);
+M load_material(const double* lanes, const Program* program) {
+  if constexpr (takes_program<M>) {
+    return M(lanes, kLanes, *program);
+  } else {
+    V parameters[M::parameter_count];
+    for (int k = 0; k < M::parameter_count; ++k) parameters[k] = V::load_unaligned(lanes + k * kLanes);
+    return M(parameters);
+  }
+}
+
+template <class M>
+std::int64_t parameter_count(const Program* program) {
+  if constexpr (takes_program<M>) {
+    return program->parameter_count;
+  } else {
+    return M::parameter_count;
+  }
 }
 
 // visit(tets, material) for every vector of elements of the chunk, in order.
 template <class V, template <class> class M, class Visit>
 void for_each_tets(const ChunkData& chunk, const Visit& visit) {
+  const std::int64_t width = parameter_count<M<V>>(chunk.program) * kLanes;
   for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
     for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size))
-      visit(Tets<V>(chunk, pack, lane), load_material<M<V>, V>(chunk, pack, lane));
+      visit(Tets<V>(chunk, pack, lane), load_material<M<V>, V>(chunk.parameters + pack * width + lane, chunk.program));
 }
 
 // The chunk's own copy of its node positions, padded to 4 doubles a node.
@@ -244,15 +258,12 @@ Stiffness9<V> expand_spectrum(const Spectrum<V>& S, const Svd3<V>& svd) {
 }
 
 template <class V, template <class> class M>
-void lanes_density(const double* F_lanes, const double* parameter_lanes, bool project, double* energy, double* stress,
-                   double* stiffness) {
+void lanes_density(const double* F_lanes, const double* parameter_lanes, const Program* program, bool project,
+                   double* energy, double* stress, double* stiffness) {
   for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
     Mat3<V> F;
     for (int k = 0; k < 9; ++k) F(k / 3, k % 3) = V::load_unaligned(F_lanes + k * kLanes + lane);
-    V parameters[M<V>::parameter_count];
-    for (int k = 0; k < M<V>::parameter_count; ++k)
-      parameters[k] = V::load_unaligned(parameter_lanes + k * kLanes + lane);
-    const M<V> material(parameters);
+    const M<V> material = load_material<M<V>, V>(parameter_lanes + lane, program);
     Mat3<V> P;
     material.energy_stress(F, P).store_unaligned(energy + lane);
     for (int k = 0; k < 9; ++k) P(k / 3, k % 3).store_unaligned(stress + k * kLanes + lane);
@@ -266,8 +277,9 @@ void lanes_density(const double* F_lanes, const double* parameter_lanes, bool pr
 
 template <class V, template <class> class M>
 MaterialKernels make_kernels() {
-  return {M<V>::name,          M<V>::parameter_count, chunk_value<V, M>, chunk_value_gradient<V, M>,
-          chunk_hessian<V, M>, lanes_density<V, M>};
+  int count = kAsProgram;
+  if constexpr (!takes_program<M<V>>) count = M<V>::parameter_count;
+  return {M<V>::name, count, chunk_value<V, M>, chunk_value_gradient<V, M>, chunk_hessian<V, M>, lanes_density<V, M>};
 }
 
 }  // namespace qlb

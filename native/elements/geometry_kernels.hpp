@@ -51,13 +51,12 @@ void chunk_correlations(const ChunkData& chunk, const double* x, const double* r
 // The rotation nearest to each of `count` matrices (count, 3, 3), in place.
 template <class V>
 void nearest_rotations(double* matrices, std::int64_t count) {
+  constexpr auto kWidth = static_cast<std::int64_t>(V::size);
   alignas(64) double buffer[9][V::size];
-  for (std::int64_t first = 0; first < count; first += V::size) {
-    const auto lanes = count - first < static_cast<std::int64_t>(V::size) ? count - first : V::size;
-    for (std::size_t l = 0; l < V::size; ++l) {
-      const double* in = matrices + 9 * (first + (static_cast<std::int64_t>(l) < lanes ? l : 0));
-      for (int k = 0; k < 9; ++k) buffer[k][l] = in[k];
-    }
+  for (std::int64_t first = 0; first < count; first += kWidth) {
+    const std::int64_t lanes = count - first < kWidth ? count - first : kWidth;
+    for (std::int64_t l = 0; l < kWidth; ++l)
+      for (int k = 0; k < 9; ++k) buffer[k][l] = matrices[9 * (first + (l < lanes ? l : 0)) + k];
     Mat3<V> G;
     for (int k = 0; k < 9; ++k) G(k / 3, k % 3) = V::load_aligned(buffer[k]);
     const Mat3<V> R = nearest_rotation(G);

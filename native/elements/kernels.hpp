@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "materials/program.hpp"
+
 namespace qlb {
 
 // One chunk of TetBlocks, as plain pointers.
@@ -16,7 +18,11 @@ struct ChunkData {
   const std::int32_t* slot_node;
   std::int64_t slots;
   std::int64_t block_slots;
+  const Program* program;  // for a material that takes one, else null
 };
+
+// How many parameters an element has where the program of the material says it.
+inline constexpr int kAsProgram = -1;
 
 // Kernels of one material at one SIMD level. `scratch` holds 4 * slots doubles.
 struct MaterialKernels {
@@ -29,8 +35,8 @@ struct MaterialKernels {
   void (*hessian)(const ChunkData&, const double* x, bool project, double* scratch, double* slot_blocks);
   // The density itself at kLanes deformation gradients: F (9, kLanes), parameters (count, kLanes) ->
   // energy (kLanes), stress (9, kLanes), stiffness (81, kLanes)
-  void (*density)(const double* F, const double* parameters, bool project, double* energy, double* stress,
-                  double* stiffness);
+  void (*density)(const double* F, const double* parameters, const Program* program, bool project, double* energy,
+                  double* stress, double* stiffness);
 };
 
 // Kernels of the geometry alone (geometry_kernels.hpp).

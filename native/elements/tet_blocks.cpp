@@ -154,7 +154,8 @@ ChunkData chunk_geometry(const TetBlocks& blocks, const Chunk& chunk) {
           chunk.packs,
           blocks.slot_node.data() + chunk.first_slot,
           chunk.slots,
-          chunk.block_slots};
+          chunk.block_slots,
+          nullptr};
 }
 
 }  // namespace qlb

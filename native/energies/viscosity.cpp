@@ -30,7 +30,7 @@ void green_strain(const TetBlocks& blocks, const Chunk& chunk, std::int64_t pack
 }  // namespace
 
 Viscosity::Viscosity(std::shared_ptr<const TetBlocks> blocks, std::span<const double> eta, int threads)
-    : ElasticEnergy(blocks, "viscous", std::vector<double>(kParameters * eta.size()), threads, ""),
+    : ElasticEnergy(blocks, "viscous", std::vector<double>(kParameters * eta.size()), threads, "", nullptr),
       blocks_(blocks),
       eta_(blocks->scatter(eta, 1)),
       threads_(threads) {}

@@ -8,6 +8,7 @@
 #include "materials/mooney_rivlin.hpp"
 #include "materials/st_venant_kirchhoff.hpp"
 #include "materials/stable_neo_hookean.hpp"
+#include "materials/symbolic.hpp"
 #include "materials/viscous.hpp"
 
 namespace qlb {
@@ -15,7 +16,8 @@ namespace qlb {
 template <template <class> class... Materials>
 struct MaterialList {};
 
-using AllMaterials = MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean, FixedCorotational, Arap,
-                                  MooneyRivlin, LinearElastic, FibreSqrtI5, FibreStVK, Viscous>;
+using AllMaterials =
+    MaterialList<StableNeoHookean, StVenantKirchhoff, CompressibleNeoHookean, FixedCorotational, Arap, MooneyRivlin,
+                 LinearElastic, FibreSqrtI5, FibreStVK, Symbolic, SymbolicWithI2, Viscous>;
 
 }  // namespace qlb

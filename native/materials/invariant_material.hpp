@@ -33,7 +33,8 @@ struct InvariantMaterial {
   V energy_stress(const Mat3<V>& F, Mat3<V>& P) const {
     const Mat3<V> G = cofactor(F);
     const Invariants<V> I = invariants(F, G);
-    const InvariantDerivatives<V> d = self().derivatives(I);
+    InvariantDerivatives<V> d;
+    const V psi = self().psi_and_slopes(I, d);
     V f = V(2.0) * d.d1;
     Mat3<V> cubic;
     if constexpr (Self::uses_I2) {
@@ -45,6 +46,12 @@ struct InvariantMaterial {
         P(i, j) = f * F(i, j) + d.dJ * G(i, j);
         if constexpr (Self::uses_I2) P(i, j) -= V(2.0) * d.d2 * cubic(i, j);
       }
+    return psi;
+  }
+
+  // psi; d receives d1, d2 and dJ at least. A material may have a shorter way.
+  V psi_and_slopes(const Invariants<V>& I, InvariantDerivatives<V>& d) const {
+    d = self().derivatives(I);
     return self().psi(I);
   }
 

@@ -11,6 +11,9 @@
 //   exact [Pa] Spectrum<V> spectrum(sigma)                  the same in the frame of the SVD (isotropic
 //   materials)
 //
+// A material whose density is a program (materials/program.hpp) says so by `static constexpr bool takes_program =
+// true`; it has no parameter_count, and M(const double* parameters, int stride, const Program&) reads the lanes itself.
+//
 // Where a material has both forms they are written down independently; a test holds one against the other.
 #pragma once
 
@@ -27,6 +30,9 @@ enum class HessianForm {
   kStiffnessPair,         // exact from stiffness(F), projected from projected_stiffness(F)
   kConvexStiffness,       // stiffness(F) is positive semidefinite as it stands
 };
+
+template <class M>
+inline constexpr bool takes_program = requires { M::takes_program; };
 
 // d2psi / dF_ik dF_jl at (3 i + k, 3 j + l); symmetric, only the lower triangle is kept.
 template <class V>

@@ -19,6 +19,7 @@ from qlb.materials import (
     MooneyRivlin,
     StableNeoHookean,
     StVenantKirchhoff,
+    SymbolicMaterial,
 )
 from qlb.mesh import TetMesh
 from qlb.simulation import Simulation, StepFailed, StepResult
@@ -51,6 +52,7 @@ __all__ = [
     "StencilEnergy",
     "StepFailed",
     "StepResult",
+    "SymbolicMaterial",
     "TetMesh",
     "Tolerance",
     "Traction",

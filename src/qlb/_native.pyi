@@ -2,7 +2,7 @@
 Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy
 from numpy.typing import NDArray
@@ -41,6 +41,21 @@ class BlockMatrix:
 
     def multiply(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
+class Program:
+    """
+    A density of the invariants as lists of operations: for psi; for psi, d1, d2, dJ; for all derivatives. A list is
+    (operations (k), registers (k, 4): target and operands, constants, outputs). Raises ValueError for a wrong one.
+    """
+
+    def __init__(self, parameter_count: int, energy: tuple[Any, ...], slopes: tuple[Any, ...], derivatives: tuple[Any, ...]) -> None: ...
+
+def program_operations() -> list[tuple[str, int]]:
+    """Name and number of operands of each operation, in their order."""
+
+MAX_REGISTERS: int = 128
+
+MAX_OPERATIONS: int = 4096
+
 class TetBlocks:
     """Linear tetrahedra laid out for SIMD and threads."""
 
@@ -56,7 +71,7 @@ class TetGeometry:
     def rotations(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], reference: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], rotations: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
 class ElasticEnergy:
-    def __init__(self, blocks: TetBlocks, material: str, parameters: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int, simd_level: str = '') -> None: ...
+    def __init__(self, blocks: TetBlocks, material: str, parameters: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int, simd_level: str = '', program: Program | None = None) -> None: ...
 
     def value(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> float: ...
 
@@ -80,7 +95,7 @@ class Inertia:
 
     def add_hessian(self, scale: float, matrix: BlockMatrix) -> None: ...
 
-def evaluate_density(material: str, F: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], parameters: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], project: bool, energy: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stress: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], simd_level: str = '') -> None: ...
+def evaluate_density(material: str, F: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], parameters: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], project: bool, energy: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stress: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], simd_level: str = '', program: Program | None = None) -> None: ...
 
 class InverseOperator:
     """x = B^-1 b for a symmetric positive definite B."""

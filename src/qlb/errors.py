@@ -9,3 +9,7 @@ class QlbError(Exception):
 
 class InputError(QlbError, ValueError):
     """The input was wrong: one line that names the thing, its value and the allowed range."""
+
+
+class MissingExtra(QlbError, ImportError):
+    """A package that an optional part of qlb needs is not installed; the message says how to get it."""

@@ -118,7 +118,7 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
         if "bounds" in extra and value is not None:
             bounds: Any = extra["bounds"]
             if _may_vary(field.annotation):
-                value = _as_varying(value)
+                return within(value, bounds, str(extra["unit"]))
             return _checked(value, bounds, str(extra["unit"]), whole=field.annotation in (int, int | None))
         return value
 
@@ -139,7 +139,9 @@ def on_mesh(settings: T, owner: str, mesh: TetMesh) -> T:
     for name, field in type(settings).model_fields.items():
         value = getattr(settings, name)
         if _may_vary(field.annotation) and isinstance(value, np.ndarray | Varying):
-            values[name] = _element_values(f"{owner} {name}", value, field, mesh)
+            extra: Any = field.json_schema_extra or {}
+            bounds, unit = extra.get("bounds", {}), str(extra.get("unit", ""))
+            values[name] = element_values(f"{owner} {name}", value, bounds, unit, mesh)
     return settings.model_copy(update=values)
 
 
@@ -151,7 +153,10 @@ def require_numbers(settings: Settings, owner: str) -> None:
             raise InputError(f"{owner} {name} is {value}: it has its values only on a mesh, see {owner}.on(mesh)")
 
 
-def _element_values(name: str, value: FloatArray | Varying, field: FieldInfo, mesh: TetMesh) -> FloatArray:
+def element_values(
+    name: str, value: FloatArray | Varying, bounds: Mapping[str, float], unit: str, mesh: TetMesh
+) -> FloatArray:
+    """`value` in each element of `mesh`, shape (m,), within `bounds`. Raises `InputError` as `on_mesh`, with `name`."""
     count = len(mesh.tets)
     try:
         values = value.on(mesh) if isinstance(value, Varying) else value
@@ -159,15 +164,18 @@ def _element_values(name: str, value: FloatArray | Varying, field: FieldInfo, me
         raise InputError(f"{name}: {error}") from None
     if values.shape != (count,):
         raise InputError(f"{name} has shape {values.shape}, must be one number or ({count},)")
-    extra: Any = field.json_schema_extra or {}
-    bounds = extra.get("bounds", {})
     bad = _outside(values, bounds)
     if bad.any():
         e = int(np.argmax(bad))
-        allowed = describe_range(bounds, str(extra.get("unit", ""))) if np.isfinite(values[e]) else "finite"
+        allowed = describe_range(bounds, unit) if np.isfinite(values[e]) else "finite"
         raise InputError(f"{name} of element {e} = {values[e]:g} is out of range: must be {allowed}")
     values.setflags(write=False)
     return values
+
+
+def within(value: Any, bounds: Mapping[str, float], unit: str = "") -> Any:
+    """`value` as one of the kinds of `PerElement`. Raises `ValueError` where what is known without a mesh is wrong."""
+    return _checked(_as_varying(value), bounds, unit, whole=False)
 
 
 def _may_vary(annotation: Any) -> bool:
@@ -193,6 +201,8 @@ def _is_number(text: str) -> bool:
 
 
 def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_equal(value, b[key]) for key, value in a.items())
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b)
     return bool(a == b)

@@ -6,6 +6,7 @@ import pytest
 from qlb import _native
 from qlb.materials import MATERIALS, IsotropicMaterial, Material
 from tests.materials.deformations import KINDS, kinds_for
+from tests.materials.symbolic_examples import symbolic_example
 from tests.support import Array
 
 YOUNG = 2e4
@@ -23,10 +24,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     objective = metafunc.definition.get_closest_marker("objective") is not None
     cases, ids = [], []
-    for name, cls in MATERIALS.items():
+    for name in [*MATERIALS, "symbolic"]:
         if objective and name == "linear":
             continue
-        for nu in RATIOS if has_poisson(cls) else [0.0]:
+        for nu in RATIOS if name == "symbolic" or has_poisson(MATERIALS[name]) else [0.0]:
             for kind in kinds_for(name) if names & {"F", "kind"} else [""]:
                 cases.append((name, nu, kind))
                 ids.append("-".join(filter(None, [name, f"nu={nu}", kind])))
@@ -41,6 +42,8 @@ def material_class(request: pytest.FixtureRequest) -> type[Material]:
 @pytest.fixture
 def material(case: tuple[str, float, str]) -> Material:
     name, nu, _ = case
+    if name == "symbolic":
+        return symbolic_example(YOUNG, nu)
     cls = MATERIALS[name]
     return cls(young=YOUNG, poisson=nu) if has_poisson(cls) else cls(young=YOUNG)
 

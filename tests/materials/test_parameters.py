@@ -10,7 +10,8 @@ from tests.materials.conftest import has_poisson
 
 def test_every_compiled_material_has_its_class() -> None:
     fibres = {Fibres(model="sqrtI5").kernels, Fibres(model="StVK").kernels}
-    assert set(_native.material_names()) == set(MATERIALS) | fibres | {"viscous"}
+    symbolic = {"symbolic", "symbolic-I2"}
+    assert set(_native.material_names()) == set(MATERIALS) | fibres | symbolic | {"viscous"}
 
 
 def test_each_name_is_that_of_its_class() -> None:

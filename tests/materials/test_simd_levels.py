@@ -61,7 +61,7 @@ def test_levels_agree_on_a_mesh(
 
     def evaluate(at: str) -> list[Array]:
         table = material.parameter_table(len(mesh.tets))
-        energy = _native.ElasticEnergy(blocks, material.model, table, 1, at)
+        energy = _native.ElasticEnergy(blocks, material.kernels, table, 1, at, material.program())
         gradient = np.zeros_like(x)
         value = energy.add_value_gradient(x, 1.0, gradient)
         results = [np.array([value]), gradient]

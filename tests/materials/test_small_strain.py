@@ -3,11 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qlb.materials import Material
+from qlb.materials import Material, SymbolicMaterial
 from tests.support import random_rotation
 
 
 def lame(material: Material) -> tuple[float, float]:
+    if isinstance(material, SymbolicMaterial):
+        return material.parameters["mu"], material.parameters["lam"]  # type: ignore[return-value]
     E, nu = float(material.young), float(getattr(material, "poisson", 0.0))
     return E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
 

@@ -12,6 +12,7 @@ from qlb.materials.material import IsotropicMaterial, Material
 from qlb.materials.mooney_rivlin import MooneyRivlin
 from qlb.materials.st_venant_kirchhoff import StVenantKirchhoff
 from qlb.materials.stable_neo_hookean import StableNeoHookean
+from qlb.materials.symbolic import SymbolicMaterial
 
 
 def _model_of(value: object) -> str:
@@ -29,7 +30,7 @@ AnyMaterial = Annotated[
     | Annotated[LinearElastic, Tag("linear")],
     Discriminator(_model_of),
 ]
-"""Any material, told apart by `model`: the one list of materials."""
+"""Any material of a scene file, told apart by `model`: the one list of them."""
 
 MATERIALS: dict[str, type[Material]] = {
     tag.tag: material for material, tag in map(get_args, get_args(get_args(AnyMaterial)[0]))
@@ -49,4 +50,5 @@ __all__ = [
     "MooneyRivlin",
     "StVenantKirchhoff",
     "StableNeoHookean",
+    "SymbolicMaterial",
 ]

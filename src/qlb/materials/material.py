@@ -24,9 +24,18 @@ class Material(Settings):
     """
 
     model: str
-    """Short name, as in scene files; also the name of the compiled kernels."""
+    """Short name, as in scene files."""
 
     density: PerElement = quantity(1000.0, "Mass density", unit="kg/m^3", gt=0)
+
+    @property
+    def kernels(self) -> str:
+        """Name of the compiled kernels."""
+        return self.model
+
+    def program(self) -> _native.Program | None:
+        """What the kernels run, for a material whose density is not compiled."""
+        return None
 
     @abstractmethod
     def kernel_parameters(self) -> tuple[PerElement, ...]:
@@ -57,7 +66,7 @@ class Material(Settings):
         """
         require_numbers(self, "material")
         columns = [per_element(self, value, elements) for value in self.kernel_parameters()]
-        return np.ascontiguousarray(np.stack(columns, axis=1))
+        return np.ascontiguousarray(np.reshape(columns, (len(columns), elements)).T)
 
     def evaluate(
         self, F: npt.ArrayLike, *, project: bool = False, simd_level: str = ""
@@ -79,7 +88,8 @@ class Material(Settings):
         F = np.ascontiguousarray(F, dtype=np.float64).reshape(-1, 3, 3)
         count = len(F)
         psi, P, C = np.empty(count), np.empty((count, 3, 3)), np.empty((count, 9, 9))
-        _native.evaluate_density(self.model, F, self.parameter_table(count), project, psi, P, C, simd_level)
+        table = self.parameter_table(count)
+        _native.evaluate_density(self.kernels, F, table, project, psi, P, C, simd_level, self.program())
         return psi, P, C
 
 

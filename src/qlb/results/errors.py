@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from qlb.errors import MissingExtra as MissingExtra
 from qlb.errors import QlbError
 
 
@@ -19,10 +20,6 @@ class WriteError(QlbError, OSError):
         super().__init__(f"cannot write {path}: {reason}; {safe}")
         self.path = path
         self.reason = reason
-
-
-class MissingExtra(QlbError, ImportError):
-    """A package that an optional part of qlb needs is not installed; the message says how to get it."""
 
 
 class RenderingFailed(QlbError, RuntimeError):

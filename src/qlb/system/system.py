@@ -60,7 +60,7 @@ class System:
         self.geometry = _native.TetGeometry(blocks, threads)
         material = material.on(mesh)
         parameters = material.parameter_table(len(mesh.tets))
-        self.elastic = _native.ElasticEnergy(blocks, material.model, parameters, threads)
+        self.elastic = _native.ElasticEnergy(blocks, material.kernels, parameters, threads, program=material.program())
         self.potentials: list[Potential] = [
             self.elastic,
             *(_native.ElasticEnergy(blocks, f.kernels, f.parameter_table(mesh), threads) for f in fibres),
