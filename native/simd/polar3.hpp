@@ -1,6 +1,7 @@
 // The rotation nearest to F, one matrix per lane.
 //
-// Scaled Newton (Higham 1986), which needs no eigenvalues, where F is well away from singular in every lane;
+// The trace f of the stretch tensor is the largest root of a quartic in the invariants of F, and the rotation is df/dF
+// (Lin, Chitalu, Komura 2022). That needs no eigenvectors and is used where F is well away from singular in every lane;
 // else the rotation-variant SVD, R = U V^T, which is the nearest rotation also for inverted F.
 #pragma once
 
@@ -8,34 +9,39 @@
 
 namespace qlb {
 
+// f = s0 + s1 + s2: f^4 - 2 I1 f^2 - 8 J f + I1^2 - 4 I2 = 0, by Newton from above, sqrt(3 I1) >= f.
 template <class V>
-Mat3<V> nearest_rotation_newton(Mat3<V> X) {
-  for (int k = 0; k < 10; ++k) {
-    const Mat3<V> G = cofactor(X);
-    const V inverse = V(1.0) / dot(column(X, 0), column(G, 0));
-    V a(0.5), b = V(0.5) * inverse;
-    if (k == 0) {  // brings the singular values around 1; later the iteration converges quadratically by itself
-      const V gamma = xsimd::sqrt(xsimd::sqrt(contract(G, G) * inverse * inverse / contract(X, X)));
-      a *= gamma;
-      b = b / gamma;
-    }
-    V change(0.0);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        const V next = a * X(i, j) + b * G(i, j);
-        const V d = next - X(i, j);
-        change += d * d;
-        X(i, j) = next;
-      }
-    if (xsimd::all(change < V(1e-17))) break;  // the next change would be of the order of rounding
+V stretch_trace(const V& I1, const V& I2, const V& J) {
+  V f = xsimd::sqrt(V(3.0) * I1);
+  const V constant = I1 * I1 - V(4.0) * I2;
+  for (int k = 0; k < 20; ++k) {
+    const V square = f * f;
+    const V value = (square - V(2.0) * I1) * square - V(8.0) * J * f + constant;
+    const V change = value / (V(4.0) * (f * (square - I1) - V(2.0) * J));
+    f -= change;
+    if (xsimd::all(change * change < V(1e-17) * square)) break;  // the next change would be rounding
   }
-  return X;
+  return f;
+}
+
+// R = df/dF = ((f^2 + I1) F + 2 f cof F - 2 F F^T F)/(f^3 - I1 f - 2 J), for det F > 0.
+template <class V>
+Mat3<V> rotation_from_trace(const Mat3<V>& F) {
+  const Mat3<V> G = cofactor(F), cubic = F * transpose_times(F, F);
+  const V I1 = contract(F, F), J = dot(column(F, 0), column(G, 0));
+  const V f = stretch_trace(I1, contract(G, G), J);
+  const V inverse = V(1.0) / (f * (f * f - I1) - V(2.0) * J);
+  const V a = (f * f + I1) * inverse, b = V(2.0) * f * inverse, c = V(2.0) * inverse;
+  Mat3<V> R;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) R(i, j) = a * F(i, j) + b * G(i, j) - c * cubic(i, j);
+  return R;
 }
 
 template <class V>
 Mat3<V> nearest_rotation(const Mat3<V>& F) {
   const V size = contract(F, F);
-  if (xsimd::all(determinant(F) > V(1e-3) * size * xsimd::sqrt(size))) return nearest_rotation_newton(F);
+  if (xsimd::all(determinant(F) > V(1e-3) * size * xsimd::sqrt(size))) return rotation_from_trace(F);
   const Svd3<V> svd = svd3(F);
   Mat3<V> R;
   for (int i = 0; i < 3; ++i)
