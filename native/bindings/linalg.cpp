@@ -3,9 +3,81 @@
 #include "linalg/cholmod_cholesky.hpp"
 #include "linalg/lbfgs.hpp"
 #include "linalg/rotated_inverse.hpp"
+#include "linalg/supernodal_cholesky.hpp"
 #include "linalg/vector_ops.hpp"
 
 namespace qlb {
+namespace {
+
+Precision precision_named(const std::string& name) {
+  if (name == "float32") return Precision::float32;
+  if (name == "float64") return Precision::float64;
+  throw std::invalid_argument("precision is 'float32' or 'float64', not '" + name + "'");
+}
+
+// A NumPy array that owns what was in the vector.
+template <class T>
+auto numpy(std::vector<T>&& values) {
+  auto* kept = new std::vector<T>(std::move(values));
+  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return nb::ndarray<nb::numpy, T, nb::ndim<1>>(kept->data(), {kept->size()}, owner);
+}
+
+void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
+  type.def(
+          "forward",
+          [](SupernodalCholesky& f, const Array<const double>& b, const Array<double>& y) {
+            f.forward(sized(b, f.size(), "b"), sized(y, f.rows(), "y"));
+          },
+          nb::arg("b"), nb::arg("y").noconvert(), ReleaseGil(), "y = L^-1 P b, y in elimination order.")
+      .def(
+          "backward",
+          [](SupernodalCholesky& f, const Array<const double>& y, const Array<double>& x) {
+            f.backward(sized(y, f.rows(), "y"), sized(x, f.size(), "x"));
+          },
+          nb::arg("y"), nb::arg("x").noconvert(), ReleaseGil(), "x = P^T L^-T y, y in elimination order.")
+      .def(
+          "forward_sparse",
+          [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {
+            SupernodalCholesky::Sparse y = f.forward_sparse(view(dofs), view(values));
+            return nb::make_tuple(numpy(std::move(y.row)), numpy(std::move(y.value)));
+          },
+          nb::arg("dofs"), nb::arg("values"),
+          "(rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.");
+}
+
+void bind_supernodal(nb::module_& m) {
+  nb::class_<SupernodalCholesky, Cholesky> type(m, "SupernodalCholesky");
+  type.def(
+          "__init__",
+          [](SupernodalCholesky* self, std::shared_ptr<BlockPattern> pattern, const Array<const std::uint8_t>& fixed,
+             int threads, const std::string& precision, const std::string& simd) {
+            new (self) SupernodalCholesky(std::move(pattern), view(fixed), threads, precision_named(precision), simd);
+          },
+          nb::arg("pattern"), nb::arg("fixed"), nb::arg("threads"), nb::arg("precision"), nb::arg("simd") = "",
+          ReleaseGil())
+      .def(
+          "solve",
+          [](SupernodalCholesky& f, const Array<const double>& b, const Array<double>& x) {
+            if (b.size() % f.size() != 0) throw std::invalid_argument("b must hold whole right-hand sides");
+            const auto count = static_cast<std::int64_t>(b.size()) / f.size();
+            f.solve(b.data(), sized(x, count * f.size(), "x"), count);
+          },
+          nb::arg("b"), nb::arg("x").noconvert(), ReleaseGil(),
+          "Several right-hand sides, one after the other in b and x: shape (count, nodes, 3).")
+      .def_prop_ro("rows", &SupernodalCholesky::rows, "Free degrees of freedom.")
+      .def_prop_ro(
+          "order",
+          [](const SupernodalCholesky& f) {
+            return numpy(std::vector<std::int64_t>(f.order().begin(), f.order().end()));
+          },
+          "Degree of freedom of each row in elimination order.")
+      .def_prop_ro("bytes", &SupernodalCholesky::bytes, "Memory of L.")
+      .def_prop_ro("solve_bytes", &SupernodalCholesky::solve_bytes, "Bytes of L that one solve reads.");
+  bind_half_solves(type);
+}
+
+}  // namespace
 
 void bind_linalg(nb::module_& m) {
   nb::class_<InverseOperator>(m, "InverseOperator", "x = B^-1 b for a symmetric positive definite B.")
@@ -43,6 +115,7 @@ void bind_linalg(nb::module_& m) {
           },
           nb::arg("x"), nb::arg("reference"), ReleaseGil())
       .def("reset", &RotatedInverse::reset);
+  bind_supernodal(m);
 
   nb::class_<Lbfgs>(m, "Lbfgs", "Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).")
       .def(nb::init<std::int64_t, int, int>(), nb::arg("size"), nb::arg("window"), nb::arg("threads"))

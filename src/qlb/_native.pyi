@@ -128,6 +128,41 @@ class RotatedInverse(InverseOperator):
 
     def reset(self) -> None: ...
 
+class SupernodalCholesky(Cholesky):
+    def __init__(self, pattern: BlockPattern, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int, precision: str, simd: str = '') -> None: ...
+
+    def solve(self, b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """
+        Several right-hand sides, one after the other in b and x: shape (count, nodes, 3).
+        """
+
+    @property
+    def rows(self) -> int:
+        """Free degrees of freedom."""
+
+    @property
+    def order(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
+        """Degree of freedom of each row in elimination order."""
+
+    @property
+    def bytes(self) -> int:
+        """Memory of L."""
+
+    @property
+    def solve_bytes(self) -> int:
+        """Bytes of L that one solve reads."""
+
+    def forward(self, b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], y: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """y = L^-1 P b, y in elimination order."""
+
+    def backward(self, y: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """x = P^T L^-T y, y in elimination order."""
+
+    def forward_sparse(self, dofs: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> tuple:
+        """
+        (rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.
+        """
+
 class Lbfgs:
     """
     Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).

@@ -33,6 +33,7 @@ class QLA(FactoredLbfgs):
         "initial_guess": "predictor",
         "max_iterations": 2000,
         "window": 8,
+        "precision": "float32",
     }
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:

@@ -24,13 +24,14 @@ class Descent(ABC):
         "initial_guess": "previous",
         "max_iterations": 500,
         "window": 5,
+        "precision": "float64",
     }
     """What a setting is where the user gives none."""
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         self.settings = settings.completed(self.defaults)
         self.tolerance = tolerance
-        self.factor = Factor(system)
+        self.factor = Factor(system, self.settings.cholesky, self.settings.precision)
 
     def begin_step(self) -> None:
         """Called once before the stages of each time step."""

@@ -11,13 +11,14 @@ from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.solvers.settings import Projection
 from qlb.system import StageProblem, System
+from qlb.system.system import CholeskyKind, Precision
 
 
 class Factor:
     """Owns the analysed factorisation of a system and counts how often it is made."""
 
-    def __init__(self, system: System) -> None:
-        self.cholesky = system.analyse()
+    def __init__(self, system: System, cholesky: CholeskyKind = "supernodal", precision: Precision = "float64") -> None:
+        self.cholesky = system.analyse(cholesky, precision)
         self._pattern = system.pattern
         self._matrix: _native.BlockMatrix | None = None
         self.count = 0

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from qlb.settings import Settings, quantity
+from qlb.system.system import CholeskyKind, Precision
 
 Projection = Literal["always", "on-demand", "never"]
 InitialGuess = Literal["previous", "predictor"]
@@ -42,6 +43,14 @@ class SolverSettings(Settings):
         None, "Nonlinear iterations of one solve before it counts as failed: 500, in QLA 2000", ge=1
     )
     window: int | None = quantity(None, "Pairs that L-BFGS keeps: 5 in QLF and QLB, 8 in QLA", ge=1, le=100)
+    precision: Precision | None = Field(
+        None,
+        description="Of the Cholesky factor and its solves, all else being float64: float64 (default of ND, QLF, QLB),"
+        " float32 (default of QLA)",
+    )
+    cholesky: CholeskyKind = Field(
+        "supernodal", description="Which Cholesky: our own supernodal one, or CHOLMOD (float64 only), the reference"
+    )
     keep_factor: bool = Field(True, description="Keep the factor over steps while that pays (QLA)")
     rotate_factor: bool = Field(True, description="Carry the factor along with the rotation of the material (QLA)")
     refactor_in_solve: bool = Field(True, description="Make a new factor within a solve that contracts slowly (QLA)")
@@ -59,3 +68,4 @@ class CompleteSettings(SolverSettings):
     initial_guess: InitialGuess
     max_iterations: int
     window: int
+    precision: Precision

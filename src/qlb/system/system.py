@@ -19,6 +19,8 @@ from qlb.settings import on_mesh
 from qlb.system.held_nodes import HeldNodes
 
 MassKind = Literal["lumped", "consistent"]
+CholeskyKind = Literal["supernodal", "cholmod"]
+Precision = Literal["float32", "float64"]
 
 
 class System:
@@ -115,8 +117,10 @@ class System:
         """Euclidean norm, the same bits for any number of threads."""
         return float(np.sqrt(self.dot(a, a)))
 
-    def analyse(self) -> _native.Cholesky:
+    def analyse(self, kind: CholeskyKind = "supernodal", precision: Precision = "float64") -> _native.Cholesky:
         """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
+        if kind == "supernodal":
+            return _native.SupernodalCholesky(self.pattern, self.held.fixed, self.threads, precision)
         return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
 
 

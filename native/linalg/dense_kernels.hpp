@@ -1,0 +1,67 @@
+// Dense kernels of the supernodal factor, compiled once for each SIMD level, for T = float and double.
+//
+// All matrices are column-major. A panel (front x columns) keeps, in place of each diagonal block of kBlock columns of
+// L, the block's inverse, with zeros above its diagonal: substitution then is nothing but products.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace qlb {
+
+constexpr int kBlock = 16;      // columns eliminated at once
+constexpr int kWide = 128;      // columns of a wide panel that are finished together
+constexpr int kTask = 192;      // rows and columns of the pieces that threads share
+constexpr int kDepth = 256;     // depth of a product that is packed at once
+constexpr int kPadding = 16;    // entries that kernels may read past a matrix; its values do not matter but are finite
+constexpr int kRightSides = 8;  // right-hand sides solved together
+
+// Entries of the work space that `subtract` and `solve_rows` need.
+constexpr std::int64_t kWorkEntries = 2 * (kTask + 48) * kDepth + 64 * kWide;
+
+template <class T>
+struct DenseKernels {
+  const char* level;
+
+  // Panel of `front` rows: its first `columns` columns become those of L. Returns the first column whose pivot is not
+  // positive or not finite, or -1.
+  int (*factor)(T* panel, std::int64_t ld, std::int64_t front, std::int64_t columns);
+  // rows (count x columns) := rows L^-T, for L as `factor` left it; work: kWorkEntries.
+  void (*solve_rows)(const T* triangle, std::int64_t ldt, std::int64_t columns, T* rows, std::int64_t ld,
+                     std::int64_t count, T* work);
+  // C (rows x columns) -= A B^T, or C = -A B^T if `fresh`. `lower`: only entries on and below the diagonal of C matter.
+  void (*subtract)(T* c, std::int64_t ldc, const T* a, const T* b, std::int64_t ld, std::int64_t rows,
+                   std::int64_t columns, std::int64_t depth, bool lower, bool fresh, T* work);
+  // Adds columns [begin, end) of the child's update matrix (lower triangle) into the parent's front, whose row 0 and
+  // column 0 would stand at `front`. runs: (start, position, length), as in Supernodes.
+  void (*extend_add)(T* front, std::int64_t ld, const T* update, std::int64_t ldu, const std::int32_t* runs,
+                     std::int64_t run_count, std::int64_t begin, std::int64_t end);
+
+  // Substitution in a panel on `sides` (1 or kRightSides) right-hand sides, columns of x (front x sides), for columns
+  // [begin, end) of the panel: their own part of x, or what they change in rows [first, last) of it (forward), or what
+  // rows [first, front) change in them (backward). Backward needs kPadding zeros below each column of x.
+  void (*forward_own)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, T* x, std::int64_t ldx,
+                      int sides);
+  void (*forward_below)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, std::int64_t first,
+                        std::int64_t last, T* x, std::int64_t ldx, int sides);
+  void (*backward_above)(const T* panel, std::int64_t ld, std::int64_t front, std::int64_t begin, std::int64_t end,
+                         std::int64_t first, T* x, std::int64_t ldx, int sides);
+  void (*backward_own)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, T* x, std::int64_t ldx,
+                       int sides);
+};
+
+// The best level that runs here, or the one named. Throws std::invalid_argument.
+template <class T>
+const DenseKernels<T>& find_dense_kernels(const std::string& level = "");
+
+template <class T>
+const DenseKernels<T>* dense_kernels_SSE2();
+template <class T>
+const DenseKernels<T>* dense_kernels_AVX2();
+template <class T>
+const DenseKernels<T>* dense_kernels_AVX512();
+template <class T>
+const DenseKernels<T>* dense_kernels_NEON64();
+
+}  // namespace qlb

@@ -1,0 +1,139 @@
+#include "linalg/supernodal_cholesky.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace qlb {
+namespace {
+
+Supernodes checked_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
+  if (static_cast<std::int64_t>(fixed.size()) != 3 * pattern.nodes())
+    throw std::invalid_argument("fixed must have one entry per degree of freedom");
+  return find_supernodes(pattern, fixed);
+}
+
+}  // namespace
+
+SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed,
+                                       int threads, Precision precision, const std::string& simd)
+    : pattern_(std::move(pattern)), supernodes_(checked_supernodes(*pattern_, fixed)), threads_(std::max(threads, 1)) {
+  row_of_dof_.assign(size(), -1);
+  for (std::int64_t k = 0; k < rows(); ++k) row_of_dof_[supernodes_.dof[k]] = static_cast<std::int32_t>(k);
+  owner_.resize(rows());
+  for (std::int32_t s = 0; s < supernodes_.count(); ++s) {
+    std::fill(owner_.begin() + supernodes_.first[s], owner_.begin() + supernodes_.first[s + 1], s);
+    nonzeros_ += supernodes_.nonzeros(s);
+    flops_ += supernodes_.flops(s);
+  }
+  const auto make = [&]<class T>(T) {
+    numeric_ = std::unique_ptr<Numeric<T>>(new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd),
+                                                          HugeBuffer<T>(kRightSides * rows()), std::vector<T>(rows())});
+  };
+  if (precision == Precision::float32)
+    make(float{});
+  else
+    make(double{});
+}
+
+std::int64_t SupernodalCholesky::bytes() const {
+  return std::visit([](const auto& numeric) { return numeric->factor.bytes(); }, numeric_);
+}
+
+std::int64_t SupernodalCholesky::factorise(const BlockMatrix& matrix) {
+  if (&matrix.pattern() != pattern_.get())
+    throw std::invalid_argument("the matrix has another pattern than the factor");
+  const std::int64_t column =
+      std::visit([&](auto& numeric) { return numeric->factor.factorise(matrix.values()); }, numeric_);
+  ready_ = column < 0;
+  return ready_ ? kPositiveDefinite : supernodes_.dof[column];
+}
+
+void SupernodalCholesky::check_ready() const {
+  if (!ready_) throw std::logic_error("solve without a factor: factorise first");
+}
+
+template <class T>
+void SupernodalCholesky::solve_sides(Numeric<T>& numeric, const double* b, double* x, int used, int sides) {
+  const std::int64_t n = rows();
+  T* y = numeric.y.data();
+  for (int r = 0; r < sides; ++r)
+    for (std::int64_t k = 0; k < n; ++k)
+      y[k + r * n] = r < used ? static_cast<T>(b[supernodes_.dof[k] + r * size()]) : T(0);
+  numeric.factor.forward(y, n, sides);
+  numeric.factor.backward(y, n, sides);
+  for (int r = 0; r < used; ++r) {
+    std::fill(x + r * size(), x + (r + 1) * size(), 0.0);
+    for (std::int64_t k = 0; k < n; ++k) x[supernodes_.dof[k] + r * size()] = y[k + r * n];
+  }
+}
+
+void SupernodalCholesky::solve(const double* b, double* x, std::int64_t count) {
+  check_ready();
+  for (std::int64_t r = 0; r < count;) {
+    const auto used = static_cast<int>(std::min<std::int64_t>(count - r, kRightSides));
+    std::visit(
+        [&](auto& numeric) {
+          solve_sides(*numeric, b + r * size(), x + r * size(), used, used == 1 ? 1 : kRightSides);
+        },
+        numeric_);
+    r += used;
+  }
+}
+
+void SupernodalCholesky::forward(const double* b, double* y) {
+  check_ready();
+  const auto run = [&](auto& numeric) {
+    for (std::int64_t k = 0; k < rows(); ++k) numeric->y.data()[k] = b[supernodes_.dof[k]];
+    numeric->factor.forward(numeric->y.data(), rows(), 1);
+    std::copy_n(numeric->y.data(), rows(), y);
+  };
+  std::visit(run, numeric_);
+}
+
+void SupernodalCholesky::backward(const double* y, double* x) {
+  check_ready();
+  const auto run = [&](auto& numeric) {
+    std::copy_n(y, rows(), numeric->y.data());
+    numeric->factor.backward(numeric->y.data(), rows(), 1);
+    std::fill(x, x + size(), 0.0);
+    for (std::int64_t k = 0; k < rows(); ++k) x[supernodes_.dof[k]] = numeric->y.data()[k];
+  };
+  std::visit(run, numeric_);
+}
+
+std::vector<std::int32_t> SupernodalCholesky::path_to_root(std::span<const std::int64_t> dof) const {
+  std::vector<std::int32_t> path;
+  std::vector<std::uint8_t> seen(supernodes_.count(), 0);
+  for (const std::int64_t d : dof) {
+    if (d < 0 || d >= size()) throw std::out_of_range("degree of freedom " + std::to_string(d) + " does not exist");
+    if (row_of_dof_[d] < 0) continue;
+    for (std::int32_t s = owner_[row_of_dof_[d]]; s >= 0 && !seen[s]; s = supernodes_.parent[s])
+      seen[s] = 1, path.push_back(s);
+  }
+  std::sort(path.begin(), path.end());
+  return path;
+}
+
+SupernodalCholesky::Sparse SupernodalCholesky::forward_sparse(std::span<const std::int64_t> dof,
+                                                              std::span<const double> value) {
+  check_ready();
+  if (dof.size() != value.size()) throw std::invalid_argument("one value per degree of freedom is wanted");
+  const std::vector<std::int32_t> path = path_to_root(dof);
+  Sparse result;
+  const auto run = [&]<class T>(std::unique_ptr<Numeric<T>>& numeric) {
+    T* y = numeric->sparse_work.data();
+    for (std::size_t k = 0; k < dof.size(); ++k)
+      if (row_of_dof_[dof[k]] >= 0) y[row_of_dof_[dof[k]]] += static_cast<T>(value[k]);
+    numeric->factor.forward_along(path, y);
+    for (const std::int32_t s : path)
+      for (std::int32_t k = supernodes_.first[s]; k < supernodes_.first[s + 1]; ++k) {
+        result.row.push_back(k);
+        result.value.push_back(y[k]);
+        y[k] = T(0);
+      }
+  };
+  std::visit(run, numeric_);
+  return result;
+}
+
+}  // namespace qlb

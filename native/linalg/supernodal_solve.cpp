@@ -1,0 +1,147 @@
+// The solves of SupernodalFactor.
+#include <omp.h>
+
+#include <algorithm>
+
+#include "linalg/supernodal_factor.hpp"
+#include "linalg/teamwork.hpp"
+
+namespace qlb {
+namespace {
+
+constexpr std::int64_t kRowsPerTask = 512, kColumnsPerTask = 16;
+
+std::int64_t pieces(std::int64_t n, std::int64_t size) {
+  return (n + size - 1) / size;
+}
+
+}  // namespace
+
+// The vectors that supernode s passes up, rows_below(s) apart.
+template <class T>
+T* SupernodalFactor<T>::pending(std::int32_t s, int thread) {
+  return (sides_.shared[s] ? shared_pending_ : thread_pending_[thread]).data() + sides_.offset[s];
+}
+
+// The front's own part of y, and what the children leave.
+template <class T>
+void SupernodalFactor<T>::gather_forward(std::int32_t s, int thread, const T* y, std::int64_t ld, int sides, T* x) {
+  const std::int64_t columns = supernodes_.columns(s), below = supernodes_.rows_below(s);
+  for (int r = 0; r < sides; ++r) {
+    std::copy_n(y + supernodes_.first[s] + r * ld, columns, x + r * side_ld_);
+    std::fill_n(x + columns + r * side_ld_, below, T(0));
+  }
+  for (const std::int32_t c : supernodes_.children(s)) {
+    if (!on_path_.empty() && !on_path_[c]) continue;
+    const std::int32_t* positions = supernodes_.positions(c);
+    const std::int64_t rows = supernodes_.rows_below(c);
+    for (int r = 0; r < sides; ++r) {
+      const T* from = pending(c, thread) + r * rows;
+      T* to = x + r * side_ld_;
+      for (std::int64_t k = 0; k < rows; ++k) to[positions[k]] += from[k];
+    }
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::forward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  const T* L = panel(s);
+  T* x = side_work(thread, shared);
+  once(shared, [&] { gather_forward(s, thread, y, ld, sides, x); });
+  for (std::int64_t j = 0; j < columns; j += kWide) {
+    const std::int64_t end = std::min<std::int64_t>(columns, j + kWide);
+    const std::int64_t piece = shared ? kRowsPerTask : std::max<std::int64_t>(front - end, 1);
+    once(shared, [&] { kernels_.forward_own(L, front, j, end, x, side_ld_, sides); });
+    for_each(shared, pieces(front - end, piece), [&](std::int64_t k) {
+      const std::int64_t first = end + k * piece;
+      kernels_.forward_below(L, front, j, end, first, std::min(front, first + piece), x, side_ld_, sides);
+    });
+  }
+  once(shared, [&] {
+    T* up = pending(s, thread);
+    for (int r = 0; r < sides; ++r) {
+      std::copy_n(x + r * side_ld_, columns, y + supernodes_.first[s] + r * ld);
+      std::copy_n(x + columns + r * side_ld_, front - columns, up + r * (front - columns));
+    }
+  });
+}
+
+template <class T>
+void SupernodalFactor<T>::gather_backward(std::int32_t s, const T* y, std::int64_t ld, int sides, T* x) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  const std::int32_t* rows = supernodes_.rows(s);
+  for (int r = 0; r < sides; ++r) {
+    T* to = x + r * side_ld_;
+    const T* from = y + r * ld;
+    std::copy_n(from + supernodes_.first[s], columns, to);
+    for (std::int64_t k = 0; k < front - columns; ++k) to[columns + k] = from[rows[k]];
+    std::fill_n(to + front, kPadding, T(0));
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  const T* L = panel(s);
+  T* x = side_work(thread, shared);
+  once(shared, [&] { gather_backward(s, y, ld, sides, x); });
+  for (std::int64_t j = (columns - 1) / kWide * kWide; j >= 0; j -= kWide) {
+    const std::int64_t end = std::min<std::int64_t>(columns, j + kWide);
+    const std::int64_t piece = shared ? kColumnsPerTask : end - j;
+    for_each(shared, pieces(end - j, piece), [&](std::int64_t k) {
+      const std::int64_t first = j + k * piece;
+      kernels_.backward_above(L, front, front, first, std::min(end, first + piece), end, x, side_ld_, sides);
+    });
+    once(shared, [&] { kernels_.backward_own(L, front, j, end, x, side_ld_, sides); });
+  }
+  once(shared, [&] {
+    for (int r = 0; r < sides; ++r) std::copy_n(x + r * side_ld_, columns, y + supernodes_.first[s] + r * ld);
+  });
+}
+
+template <class T>
+void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
+  const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
+#pragma omp parallel num_threads(threads_) if (threads_ > 1)
+  {
+    const int thread = omp_get_thread_num();
+#pragma omp for schedule(dynamic, 1)
+    for (std::int64_t k = 0; k < subtrees; ++k)
+      for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
+        forward_front(s, thread, false, y, ld, sides);
+    for (const std::int32_t s : solve_schedule_.top) forward_front(s, thread, true, y, ld, sides);
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::backward(T* y, std::int64_t ld, int sides) {
+  const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
+#pragma omp parallel num_threads(threads_) if (threads_ > 1)
+  {
+    const int thread = omp_get_thread_num();
+    for (auto s = solve_schedule_.top.rbegin(); s != solve_schedule_.top.rend(); ++s)
+      backward_front(*s, thread, true, y, ld, sides);
+#pragma omp for schedule(dynamic, 1)
+    for (std::int64_t k = 0; k < subtrees; ++k)
+      for (std::int32_t s = solve_schedule_.subtrees[k].last; s-- > solve_schedule_.subtrees[k].first;)
+        backward_front(s, thread, false, y, ld, sides);
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::forward_along(std::span<const std::int32_t> path, T* y) {
+  on_path_.assign(supernodes_.count(), 0);
+  for (const std::int32_t s : path) on_path_[s] = 1;
+  for (const std::int32_t s : path) forward_front(s, 0, false, y, 0, 1);
+  on_path_.clear();
+}
+
+template void SupernodalFactor<float>::forward(float*, std::int64_t, int);
+template void SupernodalFactor<double>::forward(double*, std::int64_t, int);
+template void SupernodalFactor<float>::backward(float*, std::int64_t, int);
+template void SupernodalFactor<double>::backward(double*, std::int64_t, int);
+template void SupernodalFactor<float>::forward_along(std::span<const std::int32_t>, float*);
+template void SupernodalFactor<double>::forward_along(std::span<const std::int32_t>, double*);
+
+}  // namespace qlb
