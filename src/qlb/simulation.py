@@ -85,7 +85,7 @@ class Simulation:
         material: a hyperelastic material.
         fibres: families of fibres that are added to it.
         integrator: "BDF1", "BDF2", "SDIRK2" or "quasistatic".
-        solver: "ND", "QLF" or "QLB".
+        solver: "QLA" (the fastest), or "ND", "QLF", "QLB" as in the paper.
         step: h [s], > 0.
         gravity: acceleration [m/s^2], shape (3,), or a function of time [s] that gives it.
         velocity: initial velocity [m/s], shape (3,) or (n, 3).
@@ -109,7 +109,7 @@ class Simulation:
         material: Material,
         fibres: Sequence[Fibres] = (),
         integrator: str = "BDF2",
-        solver: str = "QLB",
+        solver: str = "QLA",
         step: float = 1e-2,
         gravity: Acceleration = (0.0, -9.81, 0.0),
         velocity: npt.ArrayLike = (0.0, 0.0, 0.0),

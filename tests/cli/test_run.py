@@ -130,7 +130,16 @@ def test_bad_mesh_file_is_refused(qlb, tmp_path, points, tet, words):
 
 def test_failed_step_gives_exit_status_1_and_keeps_what_is_done(qlb, tmp_path):
     status, out, _ = qlb(
-        "run", "bar", *SMALL, "--set", "solver_settings.max_iterations=1", "--out", "out", "--no-picture"
+        "run",
+        "bar",
+        *SMALL,
+        "--set",
+        "solver_settings.max_iterations=1",
+        "--solver",
+        "QLB",
+        "--out",
+        "out",
+        "--no-picture",
     )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert status == 1

@@ -109,7 +109,7 @@ def test_a_stopped_run_says_why(tmp_path, make_simulation):
         writer.record(simulation.advance())
     text = Page(finish_run(tmp_path / "run", picture=False)["report"]).text
     assert "Stopped after 0 steps." in text
-    assert "Step 1 (time 0.01 s) did not converge: max_iterations after 2 iterations of QLB" in text
+    assert "Step 1 (time 0.01 s) did not converge: max_iterations after 2 iterations of QLA" in text
 
 
 def test_other_endings(tmp_path, make_simulation):

@@ -50,7 +50,8 @@ def test_both_stages_of_sdirk2_share_the_factor_of_qlb() -> None:
 def test_the_first_direction_is_that_of_the_factor(solver: str) -> None:
     system = bar_system()
     problem = problem_of(system, swinging(system))
-    method, newton = make_solver(solver, system, projection="always"), make_solver("ND", system)
+    exact = {"projection": "always", "precision": "float64"}
+    method, newton = make_solver(solver, system, **exact), make_solver("ND", system)
     point = Point.at(problem, problem.start)
     method.begin_step()
     method.begin_solve(problem, point, 0.0)

@@ -46,7 +46,7 @@ class Scene(Settings):
     damping: Damping = Damping()
     loads: LoadSettings = LoadSettings()
     integrator: str = choice("BDF2", "Time integrator", INTEGRATORS)
-    solver: str = choice("QLB", "Nonlinear solver", SOLVERS)
+    solver: str = choice("QLA", "Nonlinear solver", SOLVERS)
     step: float = quantity(1e-2, "Time step h", unit="s", gt=0)
     steps: int = quantity(120, "Number of time steps", ge=1)
     tolerance: Tolerance = Tolerance()
