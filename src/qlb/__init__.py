@@ -9,6 +9,7 @@ _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
 from qlb.errors import InputError, QlbError
+from qlb.fields import TimeExpression, TimeTable
 from qlb.integrators import State
 from qlb.materials import (
     Arap,
@@ -24,7 +25,7 @@ from qlb.materials import (
 from qlb.mesh import TetMesh
 from qlb.simulation import Simulation, StepFailed, StepResult
 from qlb.solvers import Reason, SolverSettings, Tolerance
-from qlb.system import Rotation, Translation
+from qlb.system import Keyframes, Rotation, Translation
 
 __version__ = _version("qlb")
 
@@ -36,6 +37,7 @@ __all__ = [
     "Fibres",
     "FixedCorotational",
     "InputError",
+    "Keyframes",
     "LinearElastic",
     "MooneyRivlin",
     "NodalEnergy",
@@ -54,6 +56,8 @@ __all__ = [
     "StepResult",
     "SymbolicMaterial",
     "TetMesh",
+    "TimeExpression",
+    "TimeTable",
     "Tolerance",
     "Traction",
     "Translation",

@@ -24,10 +24,10 @@ def vectors(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArr
     except (TypeError, ValueError):
         raise InputError(f"{name} = {value!r} is not an array of numbers") from None
     if array.shape not in (shape, shape[-1:]):
-        allowed = " or ".join(str(s) for s in dict.fromkeys([shape[-1:], shape]))
+        allowed = " or ".join(str(s) for s in dict.fromkeys([shape[-1:], shape])) if shape else "one number"
         raise InputError(f"{name} has shape {array.shape}, must be {allowed}")
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
         where = f" of node {bad[0][0]}" if array.ndim > 1 else ""
         raise InputError(f"{name}{where} is {array[bad[0][0]] if array.ndim > 1 else array}, must be finite")
-    return np.ascontiguousarray(np.broadcast_to(array, shape)).copy()
+    return np.array(np.broadcast_to(array, shape), order="C")

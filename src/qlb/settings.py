@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Self, TypeVar, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args, get_origin
 
 import numpy as np
 from pydantic import (
@@ -22,14 +22,17 @@ from pydantic_core import PydanticSerializationError
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
-from qlb.fields import Expression, Function, RegionTable, Varying
+from qlb.fields import Expression, Function, RegionTable, TimeFunction, Varying
 from qlb.mesh.tet_mesh import TetMesh
 
 
 def plain(value: Any) -> Any:
     """The value of a field as plain data. Raises `InputError` for a Python function."""
-    if isinstance(value, Varying):
+    if isinstance(value, Varying | TimeFunction):
         return value.written()
+    if callable(value):
+        name = getattr(value, "__name__", type(value).__name__)
+        raise InputError(f"the function {name} cannot be written to a scene file; use expressions")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
@@ -38,6 +41,9 @@ PerElement = Annotated[float | FloatArray | Varying, PlainSerializer(plain, when
 of the rest position such as "2e4 * (1 + x)", or a function of the elements' centroids (m, 3) [m] that gives (m,)."""
 
 T = TypeVar("T", bound="Settings")
+
+ENTRY = "N"
+"""Stands for the number of an entry in the keys of a list."""
 
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
@@ -273,10 +279,16 @@ def _satisfies(name: str, numbers: FloatArray | np.float64, limit: float) -> Any
 def _one_line(model: type[BaseModel], error: ValidationError) -> str:
     """The first problem of a ValidationError in one line, and how many there are."""
     problems = error.errors()
-    first = problems[0]
+    first = next(
+        (p for p in problems if p["type"] == "extra_forbidden"), problems[0]
+    )  # a misspelt key is a missing one
     key, beside = _locate(model, first["loc"])
     if first["type"] == "extra_forbidden":
         text = unknown_key(key, beside)
+    elif first["type"] == "missing":
+        text = f"{key} is missing"
+    elif first["type"] == "model_type":
+        text = f"{key} = {_short(first['input'])} must hold keys and values"
     elif first["type"] == "union_tag_invalid":
         context = first["ctx"]
         options = context["expected_tags"].replace("'", "")
@@ -297,6 +309,9 @@ def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[st
     parts: list[str] = []
     members, beside = [model], [model]
     for part in location:
+        if isinstance(part, int):  # an entry of a list
+            parts.append(str(part))
+            continue
         tagged = [m for m in members if "model" in m.model_fields and m.model_fields["model"].default == part]
         if tagged and not any(part in m.model_fields for m in members):
             members = tagged
@@ -325,14 +340,16 @@ def unknown_key(key: str, valid: Iterable[str]) -> str:
 def key_fields(model: type[BaseModel], prefix: str = "") -> dict[str, FieldInfo]:
     """Every key of a settings model, dotted, with its field: `{"mesh.size": ..., "step": ...}`.
 
-    Where a key holds one of several models, such as a material, the keys of all are there.
+    Where a key holds one of several models, such as a material, the keys of all are there. Where it holds a list of
+    them, it is there itself, and the keys of its entries with `ENTRY` for their number.
     """
     fields: dict[str, FieldInfo] = {}
     for name, field in model.model_fields.items():
         inner = nested_models(field.annotation)
+        is_list = get_origin(field.annotation) is tuple and bool(inner)
         for member in inner:
-            fields |= key_fields(member, f"{prefix}{name}.")
-        if not inner:
+            fields |= key_fields(member, f"{prefix}{name}.{ENTRY}." if is_list else f"{prefix}{name}.")
+        if is_list or not inner:
             fields[prefix + name] = field
     return fields
 

@@ -7,7 +7,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from qlb import Rotation, Simulation, SolverSettings, StableNeoHookean, TetMesh, Tolerance
+from qlb import (
+    PointForce,
+    Pressure,
+    Rotation,
+    Simulation,
+    SolverSettings,
+    StableNeoHookean,
+    TetMesh,
+    TimeExpression,
+    TimeTable,
+    Tolerance,
+    Traction,
+)
 from tests.support import Array, left_end, right_end
 
 LENGTH = 1.0
@@ -86,6 +98,34 @@ def test_trajectories_agree(
         found = trajectory(variant, integrator, solver, tolerance, STIFF, settings | {"initial_guess": guess})
         error = np.abs(found - reference(variant, integrator)).max()
         assert error <= accuracy * LENGTH, f"error {error:.2g} m at tolerance {tolerance.relative}"
+
+
+def under_loads(integrator: str, solver: str, settings: dict[str, object]) -> Array:
+    """Positions after each step under a pressure on an open set, a traction and a force, each in time."""
+    simulation = Simulation(
+        MESH,
+        material=STIFF,
+        integrator=integrator,
+        solver=solver,
+        step=0.01,
+        gravity=(0.0, 0.0, 0.0),
+        tolerance=CLOSE,
+        solver_settings=SolverSettings(**settings),  # type: ignore[arg-type]
+        threads=1,
+    )
+    simulation.pin(left_end(MESH))
+    simulation.add(Pressure(MESH.faces_where(lambda x: x[:, 1] > 0.25 - 1e-9), TimeExpression("1e3 * t")))
+    simulation.add(Traction(MESH.faces_where(lambda x: x[:, 0] > 1 - 1e-9), TimeTable([0, 1], [[0] * 3, [0, 0, 5e3]])))
+    simulation.add(PointForce(right_end(MESH)[:1], lambda t: (-50 * t, 0, 0)))
+    return np.stack([result.positions for result in simulation.run(10)])
+
+
+@pytest.mark.parametrize(("solver", "settings"), METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_trajectories_under_loads_agree(integrator: str, solver: str, settings: dict[str, object]) -> None:
+    best = under_loads(integrator, "ND", {"projection": "on-demand"})
+    assert np.abs(best[-1] - MESH.positions).max() > 5e-4
+    np.testing.assert_allclose(under_loads(integrator, solver, settings), best, rtol=0, atol=1e-9 * LENGTH)
 
 
 @pytest.mark.parametrize("variant", ["drop", "twist"])

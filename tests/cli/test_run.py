@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from qlb.cli.main import main
@@ -92,6 +93,10 @@ def test_folder_with_a_run_is_refused_and_left_alone(qlb, tmp_path):
         (["run", "bar", "--set", "mesh.cells=0,1,1"], ["(0, 1, 1)", ">= 1"]),
         (["run", "bar", "--set", "mesh.size=1,0,1"], ["(1.0, 0.0, 1.0)", "> 0 m"]),
         (["run", "bar", "--set", "step"], ["'step'", "KEY=VALUE"]),
+        (["run", "bar", "--set", "loads.presure=[]"], ["loads.presure", "loads.pressure"]),
+        (["run", "bar", "--set", "loads.pressure=[{faces: x > 2, value: 1}]"], ["loads.pressure.0.faces", "[0, 1]"]),
+        (["run", "bar", "--set", "loads.gravity={times: [0, 0], values: [1, 2]}"], ["loads.gravity", "increase"]),
+        (["run", "bar", "--set", "loads.gravity=0,t +,0"], ["loads.gravity", "'t +'", "not a formula"]),
         (["run", "bar", "--set", "mesh.path=nowhere.msh"], ["nowhere.msh", "does not exist"]),
         (["compare", "bar", "--solvers", "ND,ND"], ["ND", "once"]),
         (["compare", "bar", "--solvers", "ND:speed=9"], ["solver_settings.speed"]),
@@ -157,6 +162,16 @@ def test_shown_scene_runs_and_is_the_same_scene(qlb, tmp_path):
         assert qlb("run", scene, *SMALL, "--out", out, "--no-picture")[0] == 0
     assert (tmp_path / "a" / "scene.yaml").read_text() == (tmp_path / "b" / "scene.yaml").read_text()
     assert (tmp_path / "a" / "stats.csv").read_text() != ""
+
+
+def test_a_run_keeps_its_loads_in_its_scene_file(qlb, tmp_path):
+    loads = ["loads.pressure=[{faces: y > 0.24, value: 100 * t}]", "loads.gravity=0,-9.81 * t,0"]
+    sets = [word for load in loads for word in ("--set", load)]
+    assert qlb("run", "bar", *SMALL, *sets, "--out", "a", "--no-picture")[0] == 0
+    assert qlb("run", "a/scene.yaml", "--out", "b", "--no-picture")[0] == 0
+    assert (tmp_path / "a" / "scene.yaml").read_text() == (tmp_path / "b" / "scene.yaml").read_text()
+    frames = [np.load(tmp_path / name / "frames" / "000003.npz")["positions"] for name in "ab"]
+    np.testing.assert_array_equal(frames[0], frames[1])
 
 
 def test_verbose_prints_a_readable_line_for_each_step(qlb):

@@ -12,6 +12,7 @@ import pytest
 from qlb.cli.main import main
 from qlb.materials import MATERIALS
 from qlb.results import COLUMNS
+from qlb.scenes import load_scene
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -47,6 +48,12 @@ def test_commands(snippet, tmp_path, monkeypatch, capsys):
         output = capsys.readouterr().out
         if target:
             Path(target.strip()).write_text(output)
+
+
+@pytest.mark.parametrize("snippet", blocks("yaml"))
+def test_parts_of_scene_files(snippet, tmp_path):
+    (tmp_path / "scene.yaml").write_text(f"scene: bar\n{snippet}")
+    load_scene(str(tmp_path / "scene.yaml")).build()
 
 
 def test_local_links_lead_somewhere():

@@ -13,7 +13,7 @@ import pytest
 
 from qlb import InputError, TetMesh
 from qlb.fields import Expression
-from qlb.fields.expression import ALLOWED, FUNCTIONS, MAX_DEPTH, MAX_LENGTH
+from qlb.fields.formula import FUNCTIONS, MAX_DEPTH, MAX_LENGTH, allowed
 
 POINTS = np.random.default_rng(7).uniform(0.05, 0.95, (50, 3))
 X, Y, Z = POINTS.T
@@ -164,7 +164,7 @@ def test_the_message_says_what_is_allowed():
         Expression("stiff")
     assert str(refusal.value) == (
         "'stiff' is not a number, and as an expression it uses 'stiff', which is not known (column 1);"
-        f" allowed are {ALLOWED}"
+        f" allowed are {allowed(('x', 'y', 'z'))}"
     )
 
 

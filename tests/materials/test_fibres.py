@@ -117,9 +117,23 @@ def test_directions_may_differ_and_need_no_unit_length() -> None:
     np.testing.assert_allclose(of_place.parameter_table(mesh)[:, 1:], np.tile([1.0, 0.0, 0.0], (12, 1)))
 
 
+def test_directions_may_be_expressions_of_place() -> None:
+    mesh = TetMesh.box(cells=(2, 1, 1))
+    found = Fibres(modulus=5.0, direction=("-y", "1e-1 + x", 0)).parameter_table(mesh)[:, 1:]
+    x, y, _ = mesh.centroids().T
+    expected = np.stack([-y, 0.1 + x, 0 * x], axis=1)
+    np.testing.assert_allclose(found, expected / np.linalg.norm(expected, axis=1)[:, None], rtol=1e-14)
+    listed = Fibres(direction=np.arange(36.0).reshape(12, 3).tolist())
+    np.testing.assert_array_equal(listed.direction, np.arange(36.0).reshape(12, 3))
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        ({"direction": ("x", "y")}, ["direction", "three numbers or expressions"]),
+        ({"direction": ("x", "y", "w")}, ["direction", "'w', which is not known"]),
+        ({"direction": ("x", True, 0)}, ["direction", "three numbers or expressions"]),
+        ({"direction": ("x - x", 0, 0)}, ["fibre direction of element 0", "length > 0"]),
         ({"direction": (0.0, 0.0, 0.0)}, ["fibre direction of element 0", "length > 0"]),
         ({"direction": np.ones((3, 3))}, ["(3, 3)", "(12, 3)"]),
         ({"direction": lambda x: x * np.nan}, ["element 0", "length > 0"]),

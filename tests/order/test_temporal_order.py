@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from qlb import Damping, Simulation, StableNeoHookean, State, Tolerance
+from qlb import Damping, Pressure, Simulation, StableNeoHookean, State, Tolerance
 from tests.support import ROBUST_NEWTON, TIGHT, Array, finish, fitted_slope, left_end, right_end, small_bar, start_at
 
 SOFT = StableNeoHookean(young=1e3, poisson=0.3)
@@ -29,6 +29,7 @@ class Scenario:
     damping: Damping | None = None
     loaded: bool = False
     scripted: bool = False
+    pressed: bool = False
 
 
 SCENARIOS = {
@@ -38,6 +39,7 @@ SCENARIOS = {
     "released, stiffness damping": Scenario(damping=Damping(stiffness=0.02)),
     "released, consistent mass": Scenario(mass="consistent"),
     "loaded in time": Scenario(loaded=True),
+    "pressed on an open set": Scenario(pressed=True),
     "scripted": Scenario(scripted=True),
     "scripted, damped": Scenario(scripted=True, damping=Damping(mass=5.0)),
     "scripted, viscous": Scenario(scripted=True, damping=Damping(viscosity=20.0)),
@@ -64,6 +66,11 @@ def load(time: float) -> Array:
     return np.array([0.0, -2.0 * np.cos(3 * time), 0.0])
 
 
+def push(time: float) -> float:
+    """A pressure [Pa] that grows; what it presses on has turned by a tenth of a radian and more at the end."""
+    return 800.0 * time * (1 + time)
+
+
 @cache
 def end_of(scenario: Scenario, integrator: str, count: int) -> State:
     """The state at `TIME` after `count` steps."""
@@ -85,7 +92,9 @@ def end_of(scenario: Scenario, integrator: str, count: int) -> State:
     simulation.pin(left_end(MESH))
     if scenario.scripted:
         simulation.move(right_end(MESH), sway)
-    if not scenario.loaded and not scenario.scripted:
+    if scenario.pressed:
+        simulation.add(Pressure(MESH.faces_where(lambda x: x[:, 1] > 0.25 - 1e-9), push))
+    elif not scenario.loaded and not scenario.scripted:
         start_at(simulation, bent(MESH.positions))
     return finish(simulation, count)
 
@@ -125,7 +134,7 @@ def test_order_of_the_velocities_of_scripted_nodes(integrator: str, order: float
 
 def test_the_motion_is_large() -> None:
     # Or the orders would be those of a linear problem.
-    for name in ("released", "loaded in time", "scripted"):
+    for name in ("released", "loaded in time", "pressed on an open set", "scripted"):
         moved = end_of(SCENARIOS[name], "SDIRK2", REFERENCE).positions - MESH.positions
         assert np.abs(moved).max() > 0.05, name
 

@@ -58,40 +58,6 @@ def test_the_script_is_given_the_positions_at_time_zero(mesh: TetMesh) -> None:
     assert simulation.state.positions[nodes[0], 0] == mesh.positions[nodes[0], 0] + simulation.state.time
 
 
-def test_translation_moves_with_constant_velocity(rng: np.random.Generator) -> None:
-    anchors = rng.normal(size=(5, 3))
-    moved = Translation((1.0, -2.0, 0.5))(anchors, 0.4)
-    np.testing.assert_allclose(moved - anchors, np.tile([0.4, -0.8, 0.2], (5, 1)), atol=1e-15)
-
-
-def test_rotation_returns_after_a_turn(rng: np.random.Generator) -> None:
-    anchors = rng.normal(size=(5, 3))
-    turn = Rotation(axis=(1.0, 2.0, -0.5), origin=(0.3, 0.1, 0.2), rate=0.25)
-    for time in (0.0, 4.0, 8.0):
-        np.testing.assert_allclose(turn(anchors, time), anchors, rtol=0, atol=1e-14)
-
-
-def test_rotation_turns_counterclockwise_about_its_axis() -> None:
-    quarter = Rotation(axis=(0.0, 0.0, 2.0), origin=(1.0, 0.0, 5.0), rate=1.0)
-    np.testing.assert_allclose(quarter(np.array([[2.0, 0.0, 7.0]]), 0.25), [[1.0, 1.0, 7.0]], atol=1e-15)
-
-
-def test_rotation_keeps_distances(rng: np.random.Generator) -> None:
-    anchors = rng.normal(size=(8, 3))
-    turned = Rotation(axis=(1.0, 2.0, 3.0), origin=(0.1, 0.0, 0.0), rate=0.7)(anchors, 0.31)
-    lengths = [np.linalg.norm(x[:, None] - x[None], axis=2) for x in (anchors, turned)]
-    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-14)
-
-
-def test_rotation_turns_between_its_start_and_its_stop(rng: np.random.Generator) -> None:
-    anchors = rng.normal(size=(5, 3))
-    turn = Rotation(axis=(1, 0, 0), origin=(0, 0, 0), rate=0.5, start=1.0, stop=2.0)
-    free = Rotation(axis=(1, 0, 0), origin=(0, 0, 0), rate=0.5)
-    np.testing.assert_allclose(turn(anchors, 0.7), anchors, atol=1e-15)
-    np.testing.assert_allclose(turn(anchors, 1.5), free(anchors, 0.5), atol=1e-15)
-    np.testing.assert_array_equal(turn(anchors, 9.0), turn(anchors, 2.0))
-
-
 def test_a_node_held_along_some_axes_moves_along_the_others(mesh: TetMesh) -> None:
     simulation, nodes = bar(mesh, gravity=(1.0, 2.0, 3.0)), left_end(mesh)
     simulation.pin(nodes, axes="xz")
@@ -199,11 +165,6 @@ def test_a_wrong_motion_is_refused_and_the_state_kept(mesh: TetMesh, motion: obj
     with pytest.raises(InputError, match=r"motion .* at time"):
         simulation.advance()
     assert simulation.state is before
-
-
-def test_an_axis_of_no_length_is_refused() -> None:
-    with pytest.raises(InputError, match="axis"):
-        Rotation(axis=(0.0, 0.0, 0.0), origin=(0.0, 0.0, 0.0), rate=1.0)
 
 
 def test_nodes_cannot_be_held_after_the_first_step(mesh: TetMesh) -> None:

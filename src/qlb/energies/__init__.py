@@ -3,8 +3,9 @@
 from qlb.energies.damping import Damping
 from qlb.energies.energy import Energy, NodalEnergy, StencilEnergy
 from qlb.energies.gravity import Acceleration, Gravity
-from qlb.energies.loads import PointForce, Pressure, Traction
+from qlb.energies.loads import PointForce, Traction
 from qlb.energies.potential import DeadLoad, Potential, Term
+from qlb.energies.pressure import Pressure
 
 __all__ = [
     "Acceleration",

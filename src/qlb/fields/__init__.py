@@ -1,8 +1,18 @@
-"""Quantities that vary in space: tables by region, expressions and functions of the rest position."""
+"""Quantities that vary in space (tables by region, expressions, functions) or in time (expressions, tables)."""
 
-from qlb.fields.expression import Expression
+from qlb.fields.expression import Expression, VectorExpression
 from qlb.fields.function import Function
+from qlb.fields.in_time import TimeExpression, TimeFunction, TimeTable
 from qlb.fields.region_table import RegionTable
 from qlb.fields.varying import Varying
 
-__all__ = ["Expression", "Function", "RegionTable", "Varying"]
+__all__ = [
+    "Expression",
+    "Function",
+    "RegionTable",
+    "TimeExpression",
+    "TimeFunction",
+    "TimeTable",
+    "Varying",
+    "VectorExpression",
+]

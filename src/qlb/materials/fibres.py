@@ -3,17 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field, PlainSerializer
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
+from qlb.fields import VectorExpression
 from qlb.mesh import TetMesh
-from qlb.settings import PerElement, Settings, on_mesh, quantity
+from qlb.settings import PerElement, Settings, on_mesh, plain, quantity
 
-Direction = tuple[float, float, float] | FloatArray | Callable[[FloatArray], FloatArray]
+
+def _direction(value: Any) -> Any:
+    """`value`, made three expressions or an array where it is written as such."""
+    if isinstance(value, list | tuple) and any(isinstance(part, str) for part in value):
+        if len(value) != 3 or any(isinstance(part, bool) or not isinstance(part, str | int | float) for part in value):
+            raise InputError(f"{value!r} must be three numbers or expressions of x, y, z")
+        return VectorExpression(tuple(value))
+    if isinstance(value, list) and any(isinstance(part, list | tuple) for part in value):
+        try:
+            return np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError("must be three numbers or expressions of x, y, z, or three numbers per element") from None
+    return value
+
+
+Direction = Annotated[
+    tuple[float, float, float] | VectorExpression | FloatArray | Callable[[FloatArray], FloatArray],
+    BeforeValidator(_direction),
+    PlainSerializer(plain, when_used="json"),
+]
 
 
 class Fibres(Settings):
@@ -27,8 +47,8 @@ class Fibres(Settings):
     modulus: PerElement = quantity(2e4, "Fibre modulus mu", unit="Pa", ge=0)
     direction: Direction = Field(
         (1.0, 0.0, 0.0),
-        description="Rest direction, of any length > 0; from Python also one per element (m, 3), or a function of the"
-        " elements' centroids (m, 3) [m] that gives that",
+        description="Rest direction, of any length > 0: three numbers or expressions of x, y, z; also one per element"
+        " (m, 3), and from Python a function of the elements' centroids (m, 3) [m] that gives that",
     )
 
     @property
@@ -45,8 +65,10 @@ class Fibres(Settings):
         """
         count = len(mesh.tets)
         modulus: Any = on_mesh(self, "fibre", mesh).modulus
-        given = self.direction(mesh.centroids()) if callable(self.direction) else self.direction
-        directions = np.asarray(given, dtype=np.float64)
+        given: Any = self.direction
+        if isinstance(given, VectorExpression):
+            given = given.on(mesh)
+        directions = np.asarray(given(mesh.centroids()) if callable(given) else given, dtype=np.float64)
         if directions.shape not in ((3,), (count, 3)):
             raise InputError(f"fibre directions have shape {directions.shape}, must be (3,) or ({count}, 3)")
         directions = np.broadcast_to(directions, (count, 3))

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from qlb.materials import Fibres
 from qlb.mesh import TetMesh
-from qlb.scenes.scene import Scene, Vector
+from qlb.scenes.loads import Vector
+from qlb.scenes.scene import Scene
 from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 from qlb.system import Rotation
@@ -55,6 +56,7 @@ class BarScene(Scene):
             centre = 0.5 * (low + high)
             axis = Rotation(axis=(1.0, 0.0, 0.0), origin=tuple(centre), rate=self.twist.rate)
             simulation.move(mesh.nodes_where(lambda x: x[:, 0] >= high[0] - near), axis)
+        self.loads.add_to(simulation)
         return simulation
 
     def _composition(self, mesh: TetMesh) -> dict[str, Any]:

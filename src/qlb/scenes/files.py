@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from pydantic import BaseModel
 
 from qlb.errors import InputError
 from qlb.scenes.scene import Scene
-from qlb.settings import describe_range, key_fields, plain, unknown_key
+from qlb.settings import ENTRY, describe_range, key_fields, plain, unknown_key
 
 
 def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:
@@ -58,15 +59,33 @@ def _override(kind: type[Scene], data: dict[str, Any], override: str) -> None:
     if not separator or not key:
         raise InputError(f"--set {override!r} must have the form KEY=VALUE")
     valid = key_fields(kind)
-    if key not in valid:
+    parts = key.split(".")
+    if ".".join(ENTRY if _is_index(part) else part for part in parts) not in valid:
         raise InputError(unknown_key(key, valid))
-    *parents, last = key.split(".")
-    for parent in parents:
-        inner = data.setdefault(parent, {})
-        if not isinstance(inner, dict):
-            raise InputError(f"{parent} = {inner!r} must hold keys and values")
-        data = inner
-    data[last] = _value(text)
+    place: Any = data
+    for depth, (part, following) in enumerate(itertools.pairwise(parts), start=1):
+        index = _index(place, part, ".".join(parts[: depth - 1]))
+        if isinstance(place, dict) and place.get(part) is None:
+            place[part] = [] if _is_index(following) else {}
+        place = place[index]
+        if not isinstance(place, dict | list):
+            raise InputError(f"{'.'.join(parts[:depth])} = {place!r} must hold keys and values")
+    place[_index(place, parts[-1], ".".join(parts[:-1]))] = _value(text)
+
+
+def _is_index(part: str) -> bool:
+    """Whether this part of a key is the number of an entry in a list."""
+    return part.isascii() and part.isdecimal()
+
+
+def _index(place: dict[str, Any] | list[Any], part: str, key: str) -> Any:
+    """What leads to `part` of a key within `place`, which is at `key`. Raises `InputError` for an entry it lacks."""
+    if isinstance(place, dict) and not _is_index(part):
+        return part
+    if isinstance(place, list) and _is_index(part) and int(part) < len(place):
+        return int(part)
+    kind = f"a list of {len(place)} entries" if isinstance(place, list) else "no list"
+    raise InputError(f"{key} is {kind} and has no entry {part}")
 
 
 def _value(text: str) -> Any:
@@ -127,7 +146,7 @@ def _plain(value: Any) -> str:
         return "null"
     value = plain(value)
     if isinstance(value, tuple):
-        value = list(value)
+        value = [part.model_dump(mode="json") if isinstance(part, BaseModel) else part for part in value]
     if isinstance(value, Path):
         value = str(value)
     return yaml.safe_dump(value, default_flow_style=True, width=2**31).strip().removesuffix("...").strip()

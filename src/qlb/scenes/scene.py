@@ -5,30 +5,16 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from qlb.energies import Acceleration, Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, Fibres, StableNeoHookean
+from qlb.scenes.loads import LoadSettings
 from qlb.settings import Settings, choice, quantity
 from qlb.simulation import OnFailure, Simulation
 from qlb.solvers import SOLVERS, SolverSettings, Tolerance
 from qlb.system.system import MassKind
-
-Vector = tuple[float, float, float]
-
-
-class LoadSettings(Settings):
-    """Loads on the body."""
-
-    gravity: Vector = Field((0.0, -9.81, 0.0), description="Acceleration [m/s^2]")
-    ramp: float | None = quantity(
-        None,
-        "Time over which gravity grows linearly from nothing [s]; by default 0, and the whole run in quasistatics",
-        unit="s",
-        ge=0,
-    )
 
 
 class OutputSettings(Settings):
@@ -60,16 +46,15 @@ class Scene(Settings):
 
     @abstractmethod
     def build(self) -> Simulation:
-        """The simulation that the scene describes. Raises `InputError` where mesh or settings are wrong."""
+        """The simulation that the scene describes, with its loads (`self.loads.add_to`).
+
+        Raises:
+            InputError: mesh or settings are wrong.
+        """
 
     def gravity(self) -> Acceleration:
         """Gravity with its ramp."""
-        acceleration, ramp = np.asarray(self.loads.gravity), self.loads.ramp
-        if ramp is None:
-            ramp = self.steps * self.step if self.integrator == "quasistatic" else 0.0
-        if ramp == 0:
-            return self.loads.gravity
-        return lambda time: acceleration * min(1.0, time / ramp)
+        return self.loads.acceleration(self.steps * self.step if self.integrator == "quasistatic" else 0.0)
 
     def simulation_arguments(self) -> dict[str, Any]:
         """The keyword arguments of `Simulation` that every scene passes on."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,43 +9,7 @@ import numpy.typing as npt
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
-
-Motion = Callable[[FloatArray, float], FloatArray]
-"""Positions of held nodes [m]: motion(anchors (k, 3), time [s]) -> (k, 3), equal to the anchors at time 0."""
-
-
-@dataclass(frozen=True)
-class Translation:
-    """Moves nodes with a constant velocity [m/s], shape (3,)."""
-
-    velocity: tuple[float, float, float]
-
-    def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
-        """Positions [m] at `time` [s]."""
-        return anchors + time * np.asarray(self.velocity)
-
-
-@dataclass(frozen=True)
-class Rotation:
-    """Turns nodes about an axis through `origin` [m] at `rate` [rev/s], from `start` to `stop` [s]."""
-
-    axis: tuple[float, float, float]
-    origin: tuple[float, float, float]
-    rate: float
-    start: float = 0.0
-    stop: float = np.inf
-
-    def __post_init__(self) -> None:
-        if not np.linalg.norm(self.axis) > 0:
-            raise InputError(f"rotation axis {self.axis} has no length: must be a direction")
-
-    def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
-        """Positions [m] at `time` [s], by Rodrigues' formula."""
-        angle = 2 * np.pi * self.rate * max(0.0, min(time, self.stop) - self.start)
-        k = np.asarray(self.axis, dtype=np.float64) / np.linalg.norm(self.axis)
-        r = anchors - np.asarray(self.origin)
-        turned = r * np.cos(angle) + np.cross(k, r) * np.sin(angle) + np.outer(r @ k, k) * (1 - np.cos(angle))
-        return np.asarray(turned + np.asarray(self.origin))
+from qlb.system.motions import Motion
 
 
 @dataclass(frozen=True)
