@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from time import perf_counter
 
 PARTS = ("gradient", "hessian", "factor", "solve", "other")
 """Parts of a step: energy with gradient; Hessian assembly; factorisation; search directions; all the rest."""
+
+
+class Section:
+    """A `with` block whose seconds are added to a part, also where it raises."""
+
+    def __init__(self, seconds: dict[str, float], part: str) -> None:
+        self._seconds, self._part = seconds, part
+
+    def __enter__(self) -> None:
+        self._start = perf_counter()
+
+    def __exit__(self, *error: object) -> None:
+        self._seconds[self._part] += perf_counter() - self._start
 
 
 class Timer:
@@ -22,14 +33,9 @@ class Timer:
         self._last = perf_counter()
         self._before = dict(self.seconds)
 
-    @contextmanager
-    def section(self, part: str) -> Iterator[None]:
-        """Count the time of the block as `part`."""
-        start = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] += perf_counter() - start
+    def section(self, part: str) -> Section:
+        """Count the time of a `with` block as `part`."""
+        return Section(self.seconds, part)
 
     def lap(self) -> dict[str, float]:
         """Seconds by part since the last lap (or the start)."""

@@ -19,8 +19,7 @@ class Factor:
 
     def __init__(self, system: System, cholesky: CholeskyKind = "supernodal", precision: Precision = "float64") -> None:
         self.cholesky = system.analyse(cholesky, precision)
-        self._pattern = system.pattern
-        self._matrix: _native.BlockMatrix | None = None
+        self._matrix = _native.BlockMatrix(system.pattern)
         self.count = 0
         """Factorisations tried so far."""
         self.projected = False
@@ -33,8 +32,9 @@ class Factor:
         still not be positive definite (to rounding, or an exact one under "never"), multiples of the identity are
         added, each time ten times more (Nocedal, Wright 2006, algorithm 3.3).
         """
+        matrix = self._matrix
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
-            matrix = problem.hessian(x, project=project)
+            problem.hessian(x, project=project, matrix=matrix)
             self.projected = project
             if self._factorise(problem, matrix):
                 return
@@ -47,18 +47,14 @@ class Factor:
     def _factorise(self, problem: StageProblem, matrix: _native.BlockMatrix) -> bool:
         with problem.timer.section("factor"):
             self.count += 1
-            self._matrix = matrix
             return self.cholesky.factorise(matrix) < 0
 
     def matrix_values(self) -> FloatArray:
-        """A copy of the blocks (b, 3, 3) that the factor in place is of. Raises `ValueError` where there is none."""
-        if self._matrix is None:
-            raise ValueError("nothing is factorised yet")
+        """A copy of the blocks (b, 3, 3) that the factor in place is of."""
         return self._matrix.values.copy()
 
     def restore(self, values: FloatArray) -> None:
         """Factorise what `matrix_values` gave, without counting it."""
-        self._matrix = _native.BlockMatrix(self._pattern)
         if values.shape != self._matrix.values.shape:
             raise InputError(f"blocks have shape {values.shape}, must be {self._matrix.values.shape}")
         self._matrix.values[...] = values

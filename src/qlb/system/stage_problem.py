@@ -37,7 +37,6 @@ class StageProblem:
         guess = self.predictor if guess is None else guess
         terms = [term.at(stage, guess) for term in system.terms]
         self._potentials = [*system.potentials, *(potential for potential in terms if potential is not None)]
-        self._hessian: _native.BlockMatrix | None = None
 
     def refreshed(self, x: FloatArray) -> StageProblem | None:
         """The problem with what its terms lag taken at `x` (n, 3) [m]; None where that is of no need.
@@ -84,21 +83,22 @@ class StageProblem:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
         return energy, system.clear_held(gradient)
 
-    def hessian(self, x: FloatArray, *, project: bool) -> _native.BlockMatrix:
+    def hessian(
+        self, x: FloatArray, *, project: bool, matrix: _native.BlockMatrix | None = None
+    ) -> _native.BlockMatrix:
         """H = (1 + c alpha) M + c^2 d2Psi/dx2 at `x`, each element's part projected to PSD where asked.
 
-        The same matrix object is filled again at each call.
+        Written to `matrix`, or to a new one.
         """
         with self.timer.section("hessian"):
             system = self.system
-            if self._hessian is None:
-                self._hessian = _native.BlockMatrix(system.pattern)
-            self._hessian.set_zero(system.threads)
+            matrix = matrix or _native.BlockMatrix(system.pattern)
+            matrix.set_zero(system.threads)
             for potential in self._potentials:
-                potential.add_hessian(x, self.force_scale, project, self._hessian)
+                potential.add_hessian(x, self.force_scale, project, matrix)
             if self.stage.inertial:
-                system.inertia.add_hessian(self._mass_scale, self._hessian)
-            return self._hessian
+                system.inertia.add_hessian(self._mass_scale, matrix)
+            return matrix
 
     @cached_property
     def predictor(self) -> FloatArray:
