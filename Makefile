@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
 NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
-FORMATTED := src tests benchmarks
+FORMATTED := src tests benchmarks examples
 
 .PHONY: run test quick lint format stubs bench docs setup clean
 
