@@ -32,7 +32,8 @@ class KelvinVoigt:
 
     Phi = sum_e vol_e eta/c |E(x) - E_b|^2, where E_b combines the strains of earlier positions as x_b combines the
     positions: so (E - E_b)/c is the integrator's own derivative of E and keeps its order. With BDF1 it is the
-    dissipation potential of Brown, Overby, Forootaninia, Narain 2018.
+    dissipation potential of Brown, Overby, Forootaninia, Narain 2018. There is one E_b: a potential is good until the
+    next is asked for.
     """
 
     lagged = False
@@ -52,7 +53,11 @@ class KelvinVoigt:
 
 
 class StiffnessDamping:
-    """Phi = beta/(2c) |x - x_b|^2_K, with the projected stiffness K [N/m] of the elastic potentials at the guess."""
+    """Phi = beta/(2c) |x - x_b|^2_K, with the projected stiffness K [N/m] of the elastic potentials at the guess.
+
+    Where that is not defined (a material with log J, an element turned inside out), K is that of the last positions.
+    There is one matrix: a potential is good until the next is asked for.
+    """
 
     lagged = True
 
@@ -64,9 +69,12 @@ class StiffnessDamping:
         """The potential with K assembled anew."""
         if not stage.inertial:
             return None
-        self._matrix.set_zero(self._threads)
-        for potential in self._elastic:
-            potential.add_hessian(guess, self._beta / stage.c, True, self._matrix)
+        for positions in (guess, stage.base[0][1]):
+            self._matrix.set_zero(self._threads)
+            for potential in self._elastic:
+                potential.add_hessian(positions, self._beta / stage.c, True, self._matrix)
+            if np.isfinite(self._matrix.values).all():
+                break
         return _Quadratic(self._matrix, stage.x_b, self._threads)
 
 

@@ -38,7 +38,8 @@ class StencilEnergy(Energy):
     """A sum over small sets of nodes, such as springs or hinges: Phi(x) = sum_s phi(x of stencil s, time).
 
     A subclass sets `stencils` and writes the three functions below, each for all stencils at once. Its Hessians are
-    projected to positive semidefinite, stencil by stencil, where a solver asks for it.
+    projected to positive semidefinite, stencil by stencil, where a solver asks for it. Where phi is not defined, it is
+    NaN or infinite: a line search goes no further than that.
     """
 
     stencils: npt.ArrayLike
@@ -58,7 +59,7 @@ class StencilEnergy(Energy):
 
     def node_sets(self, mesh: TetMesh) -> IntArray:
         """The stencils."""
-        return checked_nodes(self, "stencil", self.stencils, mesh)
+        return checked_nodes(self, "stencil", getattr(self, "stencils", None), mesh)
 
     def term(self, mesh: TetMesh, pattern: _native.BlockPattern, threads: int) -> Term:
         """The sum over the stencils."""
@@ -71,7 +72,8 @@ class NodalEnergy(Energy):
     """Any energy Phi(x, time) of all nodes, with a sparse Hessian.
 
     A subclass writes the three functions below; where its Hessian couples nodes that no tet has in common, it lists
-    them in `couplings`. The pattern of the Hessian is fixed for the whole run.
+    them in `couplings`. The pattern of the Hessian is fixed for the whole run. Where Phi is not defined, it is NaN or
+    infinite: a line search goes no further than that.
     """
 
     couplings: npt.ArrayLike = np.empty((0, 2), dtype=np.int32)
@@ -94,7 +96,11 @@ class NodalEnergy(Energy):
 
     def node_sets(self, mesh: TetMesh) -> IntArray:
         """The couplings."""
-        return checked_nodes(self, "coupling", self.couplings, mesh)
+        return (
+            checked_nodes(self, "coupling", self.couplings, mesh)
+            if np.size(self.couplings)
+            else super().node_sets(mesh)
+        )
 
     def term(self, mesh: TetMesh, pattern: _native.BlockPattern, threads: int) -> Term:
         """The energy at the stage's time."""
@@ -130,6 +136,7 @@ class _StencilSum:
         k, w = self._nodes.shape
         given = self._energy.hessian(x[self._nodes], self._time)
         blocks = shaped(self._energy, "hessian", given, (k, 3 * w, 3 * w), (k, w, 3, w, 3)).reshape(k, 3 * w, 3 * w)
+        _require_symmetric(self._energy, blocks, blocks.transpose(0, 2, 1))
         self._scatter.add_blocks(positive_semidefinite(blocks) if project else blocks, scale, matrix)
 
 
@@ -139,28 +146,32 @@ class _NodalSum:
 
     def add_value_gradient(self, x: FloatArray, scale: float, gradient: FloatArray, /) -> float:
         value = shaped(self._energy, "value", self._energy.value(x, self._time), ())
-        gradient += scale * shaped(self._energy, "gradient", self._energy.gradient(x, self._time), x.shape)
+        forces = shaped(self._energy, "gradient", self._energy.gradient(x, self._time), x.shape)
+        with np.errstate(invalid="ignore"):
+            gradient += scale * forces
         return scale * float(value)
 
     def add_hessian(self, x: FloatArray, scale: float, project: bool, matrix: _native.BlockMatrix, /) -> None:
         given = self._energy.hessian(x, self._time, project)
-        if not hasattr(given, "tobsr") or given.shape != (x.size, x.size):
-            shape = getattr(given, "shape", None)
-            raise InputError(
-                f"hessian of {_name(self._energy)} gives {type(given).__name__} of shape {shape},"
-                f" must be a SciPy sparse matrix of shape ({x.size}, {x.size})"
-            )
-        blocks = given.tobsr(blocksize=(3, 3))
-        blocks.sum_duplicates()
+        if not hasattr(given, "tobsr") or given.shape != (x.size, x.size) or given.dtype.kind not in _REAL:
+            what = f"{type(given).__name__} of shape {np.shape(given)} and type {getattr(given, 'dtype', None)}"
+            allowed = f"a SciPy sparse matrix of shape ({x.size}, {x.size})"
+            raise InputError(f"hessian of {_name(self._energy)} gives {what}, must be {allowed} of real numbers")
+        entries = given.tocsr().astype(np.float64)  # a copy
+        _require_symmetric(self._energy, entries, entries.T)
+        blocks = entries.tobsr(blocksize=(3, 3))
         rows = np.repeat(np.arange(len(x)), np.diff(blocks.indptr))
-        lower = rows >= blocks.indices
-        found = self._finder.find(rows[lower], blocks.indices[lower])
-        matrix.values[found] += scale * blocks.data[lower]
+        kept = (rows >= blocks.indices) & blocks.data.any(axis=(1, 2))
+        try:
+            found = self._finder.find(rows[kept], blocks.indices[kept])
+        except InputError as error:
+            raise InputError(f"hessian of {_name(self._energy)}: {error}") from None
+        matrix.values[found] += scale * blocks.data[kept]
 
 
-def checked_nodes(energy: Energy, what: str, given: npt.ArrayLike, mesh: TetMesh) -> IntArray:
+def checked_nodes(energy: Energy, what: str, given: npt.ArrayLike | None, mesh: TetMesh) -> IntArray:
     """`given` as node indices (k, w) of `mesh`. Raises `InputError` where they are not."""
-    nodes = np.asarray(given)
+    nodes = _as_array(given)
     if nodes.ndim != 2 or not np.issubdtype(nodes.dtype, np.integer):
         raise InputError(
             f"{what}s of {_name(energy)} have shape {nodes.shape} and type {nodes.dtype}, must be integers (k, w)"
@@ -175,11 +186,32 @@ def checked_nodes(energy: Energy, what: str, given: npt.ArrayLike, mesh: TetMesh
 
 def shaped(energy: Energy, what: str, given: npt.ArrayLike, *shapes: tuple[int, ...]) -> FloatArray:
     """`given` as an array of one of `shapes`. Raises `InputError` where it is not."""
-    array = np.asarray(given, dtype=np.float64)
+    array = _as_array(given)
+    if array.dtype.kind not in _REAL:
+        raise InputError(f"{what} of {_name(energy)} gives {type(given).__name__}, must be real numbers")
     if array.shape not in shapes:
-        allowed = " or ".join(map(str, shapes))
+        allowed = " or ".join("one number" if shape == () else str(shape) for shape in shapes)
         raise InputError(f"{what} of {_name(energy)} gives shape {array.shape}, must be {allowed}")
-    return array
+    return array.astype(np.float64, copy=False)
+
+
+_REAL = "fiu"
+
+
+def _as_array(given: npt.ArrayLike | None) -> npt.NDArray[Any]:
+    """`given` as an array, of objects where it is no array of numbers."""
+    try:
+        return np.asarray(given)
+    except ValueError:  # rows of different lengths
+        return np.asarray(None)
+
+
+@np.errstate(invalid="ignore")
+def _require_symmetric(energy: Energy, given: Any, mirrored: Any) -> None:
+    """Raise `InputError` where |H - H^T| is more than what float32 leaves of |H|. NaN is left to the solver."""
+    off = abs(given - mirrored).max() if given.shape[0] else 0.0
+    if off > 1e-5 * (abs(given).max() if off else 0.0):
+        raise InputError(f"hessian of {_name(energy)} is not symmetric: entries differ by {off:.3g} from their mirror")
 
 
 def _name(energy: Energy) -> str:

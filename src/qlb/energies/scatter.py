@@ -45,12 +45,14 @@ class StencilScatter:
         self._order = np.argsort(blocks, kind="stable")
         self._targets, self._begin = np.unique(blocks[self._order], return_index=True)
 
+    @np.errstate(invalid="ignore")
     def add_vectors(self, values: FloatArray, target: FloatArray) -> None:
         """Add `values` (k, w, 3) to `target` (n, 3)."""
         flat = values.reshape(-1, 3)
         for axis in range(3):
             target[:, axis] += np.bincount(self._nodes, weights=flat[:, axis], minlength=len(target))
 
+    @np.errstate(invalid="ignore")
     def add_blocks(self, values: FloatArray, scale: float, matrix: _native.BlockMatrix) -> None:
         """Add `scale` times the symmetric `values` (k, 3 w, 3 w) to `matrix`."""
         if len(self._targets) == 0:
@@ -62,7 +64,12 @@ class StencilScatter:
 
 
 def positive_semidefinite(matrices: FloatArray) -> FloatArray:
-    """The nearest positive semidefinite matrices in the Frobenius norm, shape (k, s, s); what is so already is kept."""
+    """The nearest positive semidefinite matrices in the Frobenius norm, shape (k, s, s); what is so already is kept.
+
+    NaN where any of them is not finite.
+    """
+    if not np.isfinite(matrices).all():
+        return np.full_like(matrices, np.nan)
     values, vectors = np.linalg.eigh(matrices)
     negative = np.minimum(values, 0.0)
     return np.asarray(matrices - np.einsum("kia,ka,kja->kij", vectors, negative, vectors))

@@ -109,6 +109,7 @@ class QLA(FactoredLbfgs):
         self.inverse.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
+        self._reference = None  # until the new factor stands
         inverted = projection == "on-demand" and problem.system.is_inverted(point.x)
         self.factor.update(problem, point.x, "always" if inverted else projection)
         self.inverse.reset()

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from qlb.arrays import FloatArray
-from qlb.solvers.factor import Factor
+from qlb.solvers.factor import Factor, HessianNotFinite
 from qlb.solvers.line_search import Point, backtrack
 from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
@@ -90,7 +90,7 @@ class Descent(ABC):
             reference = earlier.reference
         try:
             reason = self._descend(problem, log, reference)
-        except FloatingPointError:  # a Hessian that is not finite
+        except HessianNotFinite:
             reason = Reason.NOT_FINITE
         return SolveResult(log.point.x, reason, log.point.residual, reference, log.rows)
 

@@ -14,6 +14,10 @@ from qlb.system import StageProblem, System
 from qlb.system.system import CholeskyKind, Precision
 
 
+class HessianNotFinite(FloatingPointError):
+    """A Hessian is not finite. A class of its own, so that what a user's code raises is not mistaken for it."""
+
+
 class Factor:
     """Owns the analysed factorisation of a system and counts how often it is made."""
 
@@ -31,6 +35,9 @@ class Factor:
         With projection "on-demand" the exact Hessian is tried first. Should the last matrix that `projection` allows
         still not be positive definite (to rounding, or an exact one under "never"), multiples of the identity are
         added, each time ten times more (Nocedal, Wright 2006, algorithm 3.3).
+
+        Raises:
+            HessianNotFinite: nothing helps.
         """
         matrix = self._matrix
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
@@ -42,7 +49,7 @@ class Factor:
             matrix.shift_diagonal(shift)
             if self._factorise(problem, matrix):
                 return
-        raise FloatingPointError("the Hessian has entries that are not finite")
+        raise HessianNotFinite("the Hessian has entries that are not finite")
 
     def _factorise(self, problem: StageProblem, matrix: _native.BlockMatrix) -> bool:
         with problem.timer.section("factor"):

@@ -73,6 +73,7 @@ class QLF(FactoredLbfgs):
         if self._start is None:
             self._start = problem.start
         if problem.stage.c != self._c:
+            self._c = None  # should the update fail, no factor is in place
             self.factor.update(problem, self._start, self.settings.projection)
             self._c = problem.stage.c
 

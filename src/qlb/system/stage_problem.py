@@ -35,8 +35,9 @@ class StageProblem:
         self._mass_scale = 1.0 + stage.c * system.damping.mass if stage.inertial else 0.0
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
         guess = self.predictor if guess is None else guess
-        terms = [term.at(stage, guess) for term in system.terms]
-        self._potentials = [*system.potentials, *(potential for potential in terms if potential is not None)]
+        at_stage = {term: potential for term in system.terms if (potential := term.at(stage, guess)) is not None}
+        self._potentials = [*system.potentials, *at_stage.values()]
+        self._added = [at_stage[term] for term in system.added if term in at_stage]
 
     def refreshed(self, x: FloatArray) -> StageProblem | None:
         """The problem with what its terms lag taken at `x` (n, 3) [m]; None where that is of no need.
@@ -60,13 +61,31 @@ class StageProblem:
 
     @cached_property
     def residual_rounding(self) -> float:
-        """What rounding of the positions leaves of |g|: some eps of mass and stiffness times the largest coordinate."""
+        """What rounding of the positions leaves of |g|: some eps of mass and stiffness times the largest coordinate.
+
+        The stiffness of energies that were added is not known: what they make of such a change is measured.
+        """
         system, extent = self.system, float(np.abs(self.start).max())
         spring = system.norm(system.spring)
         if self.stage.inertial:
             damping = system.damping.stiffness * spring + system.norm(system.viscous_spring)
             spring += damping / self.stage.c
-        return 1e-15 * extent * (self._mass_scale * system.norm(system.mass) + self.force_scale * spring)
+        estimate = 1e-15 * extent * (self._mass_scale * system.norm(system.mass) + self.force_scale * spring)
+        return estimate + self._change_of_added(4e-16 * extent)
+
+    def _change_of_added(self, size: float) -> float:
+        """|dg| of the energies that were added when positions move by up to `size` [m]; 0 where it is not finite."""
+        if not self._added:
+            return 0.0
+        golden = 0.5 * (5**0.5 - 1)  # its multiples fill [0, 1) evenly: no two neighbours move alike
+        moves = size * (2 * (golden * np.arange(self.start.size) % 1.0) - 1).reshape(self.start.shape)
+        change = np.zeros_like(self.start)
+        with self.timer.section("gradient"):
+            for potential in self._added:
+                potential.add_value_gradient(self.start, -self.force_scale, change)
+                potential.add_value_gradient(self.start + moves, self.force_scale, change)
+        found = self.residual(self.system.clear_held(change))
+        return found if np.isfinite(found) else 0.0
 
     @cached_property
     def energy_rounding(self) -> float:

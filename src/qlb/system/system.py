@@ -32,6 +32,7 @@ class System:
         elastic: the elastic energy of the material [J].
         potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
         terms: what has another potential in each stage: loads, damping.
+        added: those of `terms` that come from energies which were added: loads on nodes and surfaces, a user's own.
         inertia: 1/2 |x - target|_M^2.
         mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
@@ -72,8 +73,8 @@ class System:
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
         self.mass: FloatArray = np.add.reduceat(values, row_begin[:-1])
         self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
-        self.terms: list[Term] = [self.gravity, *self._damping_terms(blocks)]
-        self.terms += [energy.term(mesh, self.pattern, threads) for energy in energies]
+        self.added = [energy.term(mesh, self.pattern, threads) for energy in energies]
+        self.terms: list[Term] = [self.gravity, *self._damping_terms(blocks), *self.added]
         modulus = per_element(material, material.modulus(), len(mesh.tets))
         stiffest = per_element(material, material.wave_modulus(), len(mesh.tets))
         self.stiffness = _node_stiffness(mesh, modulus, 2 / 3)
