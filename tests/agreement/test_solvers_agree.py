@@ -110,7 +110,7 @@ def under_loads(integrator: str, solver: str, settings: dict[str, object]) -> Ar
         step=0.01,
         gravity=(0.0, 0.0, 0.0),
         tolerance=CLOSE,
-        solver_settings=SolverSettings(**settings),  # type: ignore[arg-type]
+        solver_settings=SolverSettings(**{"max_iterations": 3000} | settings),  # type: ignore[arg-type]
         threads=1,
     )
     simulation.pin(left_end(MESH))
