@@ -38,13 +38,14 @@ docs: setup  ## Check that the snippets in README and docs run
 
 setup: .venv/.installed
 
-# An editable install; it is made again when native sources or requirements change.
+# An editable install, with CHOLMOD for the tests to compare with; it is made again when native sources or requirements change.
 .venv/.installed: $(NATIVE) scripts/install-system.sh
 	./scripts/install-system.sh
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet $(BUILD_REQUIRES)
-	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[dev]' \
+		--config-settings=cmake.define.QLB_CHOLMOD=ON
 	touch $@
 
 clean:

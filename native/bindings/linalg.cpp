@@ -1,6 +1,5 @@
 #include "bindings/bindings.hpp"
 
-#include "linalg/cholmod_cholesky.hpp"
 #include "linalg/lbfgs.hpp"
 #include "linalg/rotated_inverse.hpp"
 #include "linalg/supernodal_cholesky.hpp"
@@ -94,12 +93,9 @@ void bind_linalg(nb::module_& m) {
       .def_prop_ro("factor_nonzeros", &Cholesky::factor_nonzeros)
       .def_prop_ro("factor_flops", &Cholesky::factor_flops);
 
-  nb::class_<CholmodCholesky, Cholesky>(m, "CholmodCholesky")
-      .def(
-          "__init__",
-          [](CholmodCholesky* self, std::shared_ptr<BlockPattern> pattern, const Array<const std::uint8_t>& fixed,
-             int threads) { new (self) CholmodCholesky(std::move(pattern), view(fixed), threads); },
-          nb::arg("pattern"), nb::arg("fixed"), nb::arg("threads"), ReleaseGil());
+#ifdef QLB_HAS_CHOLMOD
+  bind_cholmod(m);
+#endif
 
   nb::class_<RotatedInverse, InverseOperator>(m, "RotatedInverse", "An inverse carried along by nodal rotations.")
       .def(

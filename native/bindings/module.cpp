@@ -3,7 +3,6 @@
 #include <nanobind/stl/map.h>
 
 #include <cblas.h>
-#include <cholmod.h>
 #include <metis.h>
 
 #include "elements/dispatch.hpp"
@@ -20,10 +19,6 @@ NB_MODULE(_native, m) {
   m.def("libraries", [] {
     std::map<std::string, std::string> versions;
     versions["OpenBLAS"] = openblas_get_config();
-    int cholmod[3];
-    cholmod_l_version(cholmod);
-    versions["CHOLMOD"] =
-        std::to_string(cholmod[0]) + "." + std::to_string(cholmod[1]) + "." + std::to_string(cholmod[2]);
     versions["METIS"] = std::to_string(METIS_VER_MAJOR) + "." + std::to_string(METIS_VER_MINOR) + "." +
                         std::to_string(METIS_VER_SUBMINOR);
     versions["compiler"] = __VERSION__;

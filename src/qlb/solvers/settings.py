@@ -57,6 +57,8 @@ class SolverSettings(Settings):
 
     def completed(self, defaults: dict[str, Any]) -> CompleteSettings:
         """These settings with `defaults` for what is not given."""
+        if self.cholesky == "cholmod":
+            defaults = defaults | {"precision": "float64"}
         given = {name: getattr(self, name) for name in type(self).model_fields}
         return CompleteSettings(**given | {k: v for k, v in defaults.items() if given[k] is None})
 

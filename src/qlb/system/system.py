@@ -122,6 +122,10 @@ class System:
         """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
         if kind == "supernodal":
             return _native.SupernodalCholesky(self.pattern, self.held.fixed, self.threads, precision)
+        if not hasattr(_native, "CholmodCholesky"):
+            raise InputError("cholesky = 'cholmod' is not in this build: see 'Reference' in docs/components.md")
+        if precision != "float64":
+            raise InputError(f"precision = {precision!r} is not to be had from cholmod: must be 'float64'")
         return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
 
 
