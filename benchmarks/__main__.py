@@ -1,40 +1,41 @@
-"""`python -m benchmarks [kernels|step] ...`: prints Markdown tables."""
+"""`python -m benchmarks [kernels|factor|step|ablation|variations] ...`: prints Markdown tables."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
-from benchmarks import kernels, step
+from benchmarks import kernels, step, variations
 
 
 def main() -> None:
     """Parse the command line and print what it asks for."""
+    options = _parser().parse_args()
+    sizes = [int(size) for size in options.sizes.split(",")]
+    threads = sorted({1, options.threads})
+    runs = {"steps": options.steps, "threads": options.threads, "repeats": options.repeats}
+    tables: dict[str, Callable[[], str]] = {
+        "kernels": lambda: kernels.element_table(threads),
+        "factor": lambda: kernels.factor_table(threads, [step.CELLS[size] for size in sizes]),
+        "step": lambda: step.table(sizes, options.solvers.split(","), variant=options.variant, **runs),
+        "ablation": lambda: step.table(sizes, step.ABLATION, variant=options.variant, **runs),
+        "variations": lambda: variations.table(**runs),
+    }
+    for name in options.which or ["kernels", "factor", "step"]:
+        print(tables[name](), end="\n\n", flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Benchmarks of qlb, as Markdown tables")
-    parser.add_argument("which", nargs="*", choices=["kernels", "step"], help="default: all")
+    names = ["kernels", "factor", "step", "ablation", "variations"]
+    parser.add_argument("which", nargs="*", choices=names, help="default: kernels, factor, step")
     parser.add_argument("--sizes", default="1536,5184,12288", help=f"tets, out of {list(step.CELLS)}")
-    parser.add_argument("--solvers", default=",".join(step.CASES))
+    parser.add_argument("--solvers", default=",".join(step.CASES), help="NAME:KEY=VALUE, ... for step")
     parser.add_argument("--variant", default="drop", choices=["drop", "twist"])
-    parser.add_argument("--steps", type=int, default=20)
+    parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
-    options = parser.parse_args()
-    which = options.which or ["kernels", "step"]
-    sizes = [int(size) for size in options.sizes.split(",")]
-    if "kernels" in which:
-        threads = sorted({1, options.threads})
-        print(kernels.element_table(threads), end="\n\n")
-        print(kernels.factor_table(threads, [step.CELLS[size] for size in sizes]), end="\n\n")
-    if "step" in which:
-        print(
-            step.table(
-                sizes,
-                options.solvers.split(","),
-                variant=options.variant,
-                steps=options.steps,
-                threads=options.threads,
-                repeats=options.repeats,
-            )
-        )
+    return parser
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
 from time import perf_counter
 
 import numpy as np
@@ -12,6 +11,7 @@ import sympy
 import qlb
 from benchmarks.machine import machine_line, markdown
 from qlb import _native
+from qlb.materials import MATERIALS, Material
 from qlb.mesh import TetMesh
 
 
@@ -31,13 +31,16 @@ def element_table(threads: list[int], cells: tuple[int, int, int] = (82, 20, 20)
     count = len(mesh.tets)
     pattern = _native.BlockPattern(len(mesh.positions), mesh.tets)
     blocks = _native.TetBlocks(mesh.positions, mesh.tets, pattern)
-    snh = qlb.StableNeoHookean()
-    materials = {"SNH": snh, "SNH, symbolic": symbolic_stable_neo_hookean(snh)}
+    snh, best = qlb.StableNeoHookean(), _native.simd_levels()[-1]
+    others = {name: material() for name, material in MATERIALS.items() if name != "SNH"}
+    others["SNH, symbolic"] = symbolic_stable_neo_hookean(snh)
+    cases: list[tuple[str, str, Material]] = [(level, "SNH", snh) for level in _native.simd_levels()]
+    cases += [(best, name, material) for name, material in others.items()]
     x = mesh.positions + 1e-3 * np.random.default_rng(0).standard_normal(mesh.positions.shape)
     gradient, matrix = np.zeros_like(x), _native.BlockMatrix(pattern)
     rows = []
     for workers in threads:
-        for level, (name, material) in product(_native.simd_levels(), materials.items()):
+        for level, name, material in cases:
             table = material.parameter_table(count)
             energy = _native.ElasticEnergy(blocks, material.kernels, table, workers, level, material.program())
             seconds = [

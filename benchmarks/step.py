@@ -7,6 +7,7 @@ spell of the machine does not fall on one case alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import process_time
 
@@ -19,7 +20,20 @@ from qlb.studies import SolverCase
 from qlb.timing import PARTS
 
 CELLS = {1536: "16,4,4", 5184: "24,6,6", 12288: "32,8,8", 53742: "53,13,13", 192000: "80,20,20"}
-CASES = ("ND", "ND:projection=on-demand:initial_guess=predictor", "QLB", "QLF")
+BEST_ND = "ND:projection=on-demand:initial_guess=predictor"
+CASES = ("ND:cholesky=cholmod", "ND", BEST_ND, "QLB:cholesky=cholmod", "QLB", "QLA")
+ABLATION = (
+    "QLA",
+    "QLA:precision=float64",
+    "QLA:cholesky=cholmod",
+    "QLA:keep_factor=false",
+    "QLA:rotate_factor=false",
+    "QLA:refactor_in_solve=false",
+    "QLA:initial_guess=previous",
+    "QLA:projection=always",
+    "QLA:window=5",
+)
+"""QLA, and with each ingredient off."""
 
 
 @dataclass
@@ -34,10 +48,9 @@ class Measurement:
     positions: FloatArray | None = None
 
 
-def run_case(case: SolverCase, cells: str, variant: str, steps: int, threads: int, best: Measurement) -> None:
-    """Run one case once; keep it if it is the fastest so far."""
-    overrides = [f"mesh.cells={cells}", f"variant={variant}", f"threads={threads}", "on_failure=accept"]
-    simulation = load_scene("bar", [*overrides, *case.overrides]).build()
+def run_case(case: SolverCase, overrides: Sequence[str], steps: int, best: Measurement) -> None:
+    """Run one case of the bar once; keep it if it is the fastest so far."""
+    simulation = load_scene("bar", ["on_failure=accept", f"steps={steps}", *overrides, *case.overrides]).build()
     _ = simulation.solver  # set-up (ordering, analysis) is not part of a step
     start = process_time()
     results = list(simulation.run(steps))
@@ -52,31 +65,30 @@ def run_case(case: SolverCase, cells: str, variant: str, steps: int, threads: in
         best.positions = results[-1].positions
 
 
-def measure(
-    tets: int, cases: list[SolverCase], *, variant: str, steps: int, threads: int, repeats: int
-) -> dict[str, Measurement]:
-    """Measure every case on the bar of `tets` tetrahedra."""
-    found = {case.label: Measurement() for case in cases}
+def measure(cases: Sequence[str], overrides: Sequence[str], *, steps: int, repeats: int) -> dict[str, Measurement]:
+    """Measure every case on the bar with `overrides` (KEY=VALUE)."""
+    parsed = [SolverCase.parse(case) for case in cases]
+    found = {case.label: Measurement() for case in parsed}
     for _ in range(repeats):
-        for case in cases:
-            run_case(case, CELLS[tets], variant, steps, threads, found[case.label])
+        for case in parsed:
+            run_case(case, overrides, steps, found[case.label])
     return found
 
 
 def table(
-    sizes: list[int], cases: list[str], *, variant: str = "drop", steps: int = 20, threads: int = 1, repeats: int = 3
+    sizes: list[int],
+    cases: Sequence[str],
+    *,
+    variant: str = "drop",
+    steps: int = 20,
+    threads: int = 1,
+    repeats: int = 3,
 ) -> str:
     """The split of a step for each size and case, as Markdown."""
     rows = []
     for tets in sizes:
-        found = measure(
-            tets,
-            [SolverCase.parse(case) for case in cases],
-            variant=variant,
-            steps=steps,
-            threads=threads,
-            repeats=repeats,
-        )
+        overrides = [f"mesh.cells={CELLS[tets]}", f"variant={variant}", f"threads={threads}"]
+        found = measure(cases, overrides, steps=steps, repeats=repeats)
         first = next(iter(found.values()))
         assert first.positions is not None
         for label, m in found.items():
