@@ -1,11 +1,12 @@
-"""`python -m benchmarks [kernels|factor|step|ablation|variations] ...`: prints Markdown tables."""
+"""`python -m benchmarks [kernels|factor|step|ablation|variations|armadillo] ...`: prints Markdown tables."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
-from benchmarks import kernels, step, variations
+from benchmarks import armadillo, kernels, step, variations
 
 
 def main() -> None:
@@ -20,6 +21,7 @@ def main() -> None:
         "step": lambda: step.table(sizes, options.solvers.split(","), variant=options.variant, **runs),
         "ablation": lambda: step.table(sizes, step.ABLATION, variant=options.variant, **runs),
         "variations": lambda: variations.table(**runs),
+        "armadillo": lambda: armadillo.table(options.mesh, options.solvers.split(","), **runs),
     }
     for name in options.which or ["kernels", "factor", "step"]:
         print(tables[name](), end="\n\n", flush=True)
@@ -27,11 +29,12 @@ def main() -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Benchmarks of qlb, as Markdown tables")
-    names = ["kernels", "factor", "step", "ablation", "variations"]
+    names = ["kernels", "factor", "step", "ablation", "variations", "armadillo"]
     parser.add_argument("which", nargs="*", choices=names, help="default: kernels, factor, step")
     parser.add_argument("--sizes", default="1536,5184,12288", help=f"tets, out of {list(step.CELLS)}")
     parser.add_argument("--solvers", default=",".join(step.CASES), help="NAME:KEY=VALUE, ... for step")
     parser.add_argument("--variant", default="drop", choices=["drop", "twist"])
+    parser.add_argument("--mesh", type=Path, default=Path("armadillo13K.msh"), help="file of the armadillo")
     parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)

@@ -7,13 +7,14 @@ spell of the machine does not fall on one case alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
 
 from benchmarks.machine import machine_line, markdown
+from qlb import Simulation
 from qlb.arrays import FloatArray
 from qlb.scenes import load_scene
 from qlb.studies import SolverCase
@@ -48,9 +49,18 @@ class Measurement:
     positions: FloatArray | None = None
 
 
-def run_case(case: SolverCase, overrides: Sequence[str], steps: int, best: Measurement) -> None:
-    """Run one case of the bar once; keep it if it is the fastest so far."""
-    simulation = load_scene("bar", ["on_failure=accept", f"steps={steps}", *overrides, *case.overrides]).build()
+Build = Callable[[Sequence[str]], Simulation]
+"""A simulation from settings of a scene, KEY=VALUE."""
+
+
+def bar(overrides: Sequence[str]) -> Simulation:
+    """The bar."""
+    return load_scene("bar", overrides).build()
+
+
+def run_case(build: Build, case: SolverCase, overrides: Sequence[str], steps: int, best: Measurement) -> None:
+    """Run one case once; keep it if it is the fastest so far."""
+    simulation = build(["on_failure=accept", f"steps={steps}", *overrides, *case.overrides])
     _ = simulation.solver  # set-up (ordering, analysis) is not part of a step
     start = process_time()
     results = list(simulation.run(steps))
@@ -65,13 +75,15 @@ def run_case(case: SolverCase, overrides: Sequence[str], steps: int, best: Measu
         best.positions = results[-1].positions
 
 
-def measure(cases: Sequence[str], overrides: Sequence[str], *, steps: int, repeats: int) -> dict[str, Measurement]:
-    """Measure every case on the bar with `overrides` (KEY=VALUE)."""
+def measure(
+    cases: Sequence[str], overrides: Sequence[str], *, steps: int, repeats: int, build: Build = bar
+) -> dict[str, Measurement]:
+    """Measure every case of a scene with `overrides` (KEY=VALUE)."""
     parsed = [SolverCase.parse(case) for case in cases]
     found = {case.label: Measurement() for case in parsed}
     for _ in range(repeats):
         for case in parsed:
-            run_case(case, overrides, steps, found[case.label])
+            run_case(build, case, overrides, steps, found[case.label])
     return found
 
 
@@ -85,34 +97,31 @@ def table(
     repeats: int = 3,
 ) -> str:
     """The split of a step for each size and case, as Markdown."""
-    rows = []
+    rows: list[list[str]] = []
     for tets in sizes:
         overrides = [f"mesh.cells={CELLS[tets]}", f"variant={variant}", f"threads={threads}"]
         found = measure(cases, overrides, steps=steps, repeats=repeats)
-        first = next(iter(found.values()))
-        assert first.positions is not None
-        for label, m in found.items():
-            assert m.positions is not None
-            total = sum(m.seconds.values())
-            rows.append(
-                [
-                    f"{tets}",
-                    f"`{label}`",
-                    f"{m.iterations:.1f}",
-                    f"{m.factorizations:.2f}",
-                    *(f"{1e3 * m.seconds[part] / steps:.2f}" for part in PARTS),
-                    f"{1e3 * m.cpu / steps:.2f}",
-                    f"{m.cpu / first.cpu:.2f}",
-                    f"{100 * m.seconds['other'] / total:.1f} %",
-                    f"{np.abs(m.positions - first.positions).max():.0e}" + (f", {m.failed} failed" if m.failed else ""),
-                ]
-            )
-    header = ["tets", "solver", "iterations", "factors", *(f"{p} ms" for p in PARTS), "CPU ms", "CPU ratio"]
+        rows += split_rows(str(tets), found, steps)
     title = f"Bar, {variant}, {steps} steps of the default scene, tolerance 1e-6 relative, best of {repeats}."
-    return "\n\n".join(
-        [
-            "### Split of a step",
-            f"{title} {machine_line(threads)}.",
-            markdown([*header, "Python", "final state off [m]"], rows),
-        ]
-    )
+    return f"### Split of a step\n\n{title} {machine_line(threads)}.\n\n{markdown(HEADER, rows)}"
+
+
+HEADER = [
+    *("tets", "solver", "iterations", "factors", *(f"{part} ms" for part in PARTS), "CPU ms", "CPU ratio"),
+    *("Python", "final state off [m]"),
+]
+
+
+def split_rows(tets: str, found: dict[str, Measurement], steps: int) -> list[list[str]]:
+    """A row for each case: its counts, its milliseconds a step by part, its ratio to the first case."""
+    first = next(iter(found.values()))
+    assert first.positions is not None
+    rows = []
+    for label, m in found.items():
+        assert m.positions is not None
+        row = [tets, f"`{label}`", f"{m.iterations:.1f}", f"{m.factorizations:.2f}"]
+        row += [f"{1e3 * m.seconds[part] / steps:.2f}" for part in PARTS]
+        row += [f"{1e3 * m.cpu / steps:.2f}", f"{m.cpu / first.cpu:.2f}"]
+        off = f"{np.abs(m.positions - first.positions).max():.0e}" + (f", {m.failed} failed" if m.failed else "")
+        rows.append([*row, f"{100 * m.seconds['other'] / sum(m.seconds.values()):.1f} %", off])
+    return rows

@@ -33,7 +33,7 @@ class QLA(FactoredLbfgs):
         "initial_guess": "predictor",
         "max_iterations": 2000,
         "window": 8,
-        "precision": "float32",
+        "precision": "auto",
     }
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
@@ -49,7 +49,7 @@ class QLA(FactoredLbfgs):
 
     def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Start the account of a solve."""
-        self._goal, self._iterations, self._rescues = goal, 0, 0
+        self._goal, self._iterations, self._rescues, self._indefinite = goal, 0, 0, False
         super().begin_solve(problem, point, goal)
 
     def prepare_factor(self, problem: StageProblem, point: Point) -> None:
@@ -95,7 +95,7 @@ class QLA(FactoredLbfgs):
         """What the factor was made of, and the account of its use."""
         if self._reference is None or self._kind is None:
             return {}
-        account = np.array([*self._kind, self._solves, self._spent, self._stale], dtype=np.float64)
+        account = np.array([*self._kind, self._solves, self._spent, self._stale, self.factor.raised], dtype=np.float64)
         return {"matrix": self.factor.matrix_values(), "reference": self._reference, "account": account}
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
@@ -103,15 +103,17 @@ class QLA(FactoredLbfgs):
         self._reference = arrays.get("reference")
         if self._reference is None:
             return
-        c, inertial, solves, spent, stale = arrays["account"]
+        c, inertial, solves, spent, stale, raised = arrays["account"]
         self._kind, self._solves, self._spent, self._stale = (c, bool(inertial)), int(solves), int(spent), bool(stale)
-        self.factor.restore(arrays["matrix"])
+        self.factor.restore(arrays["matrix"], raised=bool(raised))
         self.inverse.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
         self._reference = None  # until the new factor stands
-        inverted = projection == "on-demand" and problem.system.is_inverted(point.x)
-        self.factor.update(problem, point.x, "always" if inverted else projection)
+        if projection == "on-demand" and (self._indefinite or problem.system.is_inverted(point.x)):
+            projection = "always"
+        self.factor.update(problem, point.x, projection)
+        self._indefinite = self.factor.projected
         self.inverse.reset()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)

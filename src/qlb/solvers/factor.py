@@ -23,6 +23,9 @@ class Factor:
 
     def __init__(self, system: System, cholesky: CholeskyKind = "supernodal", precision: Precision = "float64") -> None:
         self.cholesky = system.analyse(cholesky, precision)
+        self._precision = precision
+        self.raised = False
+        """Whether precision "auto" has gone over to float64."""
         self._matrix = _native.BlockMatrix(system.pattern)
         self.count = 0
         """Factorisations tried so far."""
@@ -33,35 +36,53 @@ class Factor:
         """Factorise the Hessian at `x`.
 
         With projection "on-demand" the exact Hessian is tried first. Should the last matrix that `projection` allows
-        still not be positive definite (to rounding, or an exact one under "never"), multiples of the identity are
-        added, each time ten times more (Nocedal, Wright 2006, algorithm 3.3).
+        still not be positive definite (to rounding, or an exact one under "never"), precision "auto" goes over to
+        float64 for good; after that multiples of the identity are added, each time ten times more (Nocedal, Wright
+        2006, algorithm 3.3).
 
         Raises:
             HessianNotFinite: nothing helps.
         """
-        matrix = self._matrix
-        for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
-            problem.hessian(x, project=project, matrix=matrix)
-            self.projected = project
-            if self._factorise(problem, matrix):
+        if self._try(problem, x, projection):
+            return
+        scale = float(np.abs(self._matrix.values).max())
+        if np.isfinite(scale) and self._precision == "auto" and not self.raised:
+            self._raise_precision()
+            if self._try(problem, x, projection):
                 return
-        for shift in _shifts(matrix):
-            matrix.shift_diagonal(shift)
-            if self._factorise(problem, matrix):
+        for shift in _shifts(scale):
+            self._matrix.shift_diagonal(shift)
+            if self._factorise(problem):
                 return
         raise HessianNotFinite("the Hessian has entries that are not finite")
 
-    def _factorise(self, problem: StageProblem, matrix: _native.BlockMatrix) -> bool:
+    def _try(self, problem: StageProblem, x: FloatArray, projection: Projection) -> bool:
+        """The Hessians at `x` that `projection` allows, one after the other."""
+        for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
+            problem.hessian(x, project=project, matrix=self._matrix)
+            self.projected = project
+            if self._factorise(problem):
+                return True
+        return False
+
+    def _raise_precision(self) -> None:
+        assert isinstance(self.cholesky, _native.SupernodalCholesky)
+        self.cholesky.set_precision("float64")
+        self.raised = True
+
+    def _factorise(self, problem: StageProblem) -> bool:
         with problem.timer.section("factor"):
             self.count += 1
-            return self.cholesky.factorise(matrix) < 0
+            return self.cholesky.factorise(self._matrix) < 0
 
     def matrix_values(self) -> FloatArray:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""
         return self._matrix.values.copy()
 
-    def restore(self, values: FloatArray) -> None:
-        """Factorise what `matrix_values` gave, without counting it."""
+    def restore(self, values: FloatArray, *, raised: bool) -> None:
+        """Factorise what `matrix_values` gave, in the precision of then, without counting it."""
+        if raised and not self.raised:
+            self._raise_precision()
         if values.shape != self._matrix.values.shape:
             raise InputError(f"blocks have shape {values.shape}, must be {self._matrix.values.shape}")
         self._matrix.values[...] = values
@@ -75,8 +96,8 @@ class Factor:
             return x
 
 
-def _shifts(matrix: _native.BlockMatrix) -> Iterator[float]:
-    scale = float(np.abs(matrix.values).max())
+def _shifts(scale: float) -> Iterator[float]:
+    """What to add to the diagonal of a matrix whose largest entry is `scale`, time after time."""
     total = 0.0
     for exponent in range(-10, 3):
         wanted = scale * 10.0**exponent

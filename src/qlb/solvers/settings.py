@@ -45,8 +45,8 @@ class SolverSettings(Settings):
     window: int | None = quantity(None, "Pairs that L-BFGS keeps: 5 in QLF and QLB, 8 in QLA", ge=1, le=100)
     precision: Precision | None = Field(
         None,
-        description="Of the Cholesky factor and its solves, all else being float64: float64 (default of ND, QLF, QLB),"
-        " float32 (default of QLA)",
+        description="Of the Cholesky factor and its solves, all else being float64: float64 (default of ND, QLF, QLB);"
+        " float32; auto (default of QLA): float32, until a matrix is too ill-conditioned for that",
     )
     cholesky: CholeskyKind = Field(
         "supernodal", description="Which Cholesky: our own supernodal one, or CHOLMOD (float64 only), the reference"

@@ -20,7 +20,7 @@ from qlb.system.held_nodes import HeldNodes
 
 MassKind = Literal["lumped", "consistent"]
 CholeskyKind = Literal["supernodal", "cholmod"]
-Precision = Literal["float32", "float64"]
+Precision = Literal["auto", "float32", "float64"]
 
 
 class System:
@@ -121,7 +121,8 @@ class System:
     def analyse(self, kind: CholeskyKind = "supernodal", precision: Precision = "float64") -> _native.Cholesky:
         """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
         if kind == "supernodal":
-            return _native.SupernodalCholesky(self.pattern, self.held.fixed, self.threads, precision)
+            first = "float32" if precision == "auto" else precision
+            return _native.SupernodalCholesky(self.pattern, self.held.fixed, self.threads, first)
         if not hasattr(_native, "CholmodCholesky"):
             raise InputError("cholesky = 'cholmod' is not in this build: see 'Reference' in docs/components.md")
         if precision != "float64":
