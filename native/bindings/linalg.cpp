@@ -70,7 +70,7 @@ void bind_supernodal(nb::module_& m) {
           [](const SupernodalCholesky& f) {
             return numpy(std::vector<std::int64_t>(f.order().begin(), f.order().end()));
           },
-          "Degree of freedom of each row in elimination order.")
+          nb::rv_policy::move, "Degree of freedom of each row in elimination order.")
       .def_prop_ro("bytes", &SupernodalCholesky::bytes, "Memory of L.")
       .def_prop_ro("solve_bytes", &SupernodalCholesky::solve_bytes, "Bytes of L that one solve reads.");
   bind_half_solves(type);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "linalg/teamwork.hpp"
+#include "simd/flush_subnormals.hpp"
 
 namespace qlb {
 namespace {
@@ -95,6 +96,7 @@ std::int64_t SupernodalFactor<T>::factorise(const double* values) {
 #pragma omp parallel num_threads(threads_) if (threads_ > 1)
   {
     const int thread = omp_get_thread_num();
+    const FlushSubnormals flush;
 #pragma omp for schedule(dynamic, 1)
     for (std::int64_t k = 0; k < subtrees; ++k) {
       const auto [first, last] = factor_schedule_.subtrees[k];

@@ -5,6 +5,7 @@
 
 #include "linalg/supernodal_factor.hpp"
 #include "linalg/teamwork.hpp"
+#include "simd/flush_subnormals.hpp"
 
 namespace qlb {
 namespace {
@@ -106,6 +107,7 @@ void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
 #pragma omp parallel num_threads(threads_) if (threads_ > 1)
   {
     const int thread = omp_get_thread_num();
+    const FlushSubnormals flush;
 #pragma omp for schedule(dynamic, 1)
     for (std::int64_t k = 0; k < subtrees; ++k)
       for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
@@ -120,6 +122,7 @@ void SupernodalFactor<T>::backward(T* y, std::int64_t ld, int sides) {
 #pragma omp parallel num_threads(threads_) if (threads_ > 1)
   {
     const int thread = omp_get_thread_num();
+    const FlushSubnormals flush;
     for (auto s = solve_schedule_.top.rbegin(); s != solve_schedule_.top.rend(); ++s)
       backward_front(*s, thread, true, y, ld, sides);
 #pragma omp for schedule(dynamic, 1)
@@ -131,6 +134,7 @@ void SupernodalFactor<T>::backward(T* y, std::int64_t ld, int sides) {
 
 template <class T>
 void SupernodalFactor<T>::forward_along(std::span<const std::int32_t> path, T* y) {
+  const FlushSubnormals flush;
   on_path_.assign(supernodes_.count(), 0);
   for (const std::int32_t s : path) on_path_[s] = 1;
   for (const std::int32_t s : path) forward_front(s, 0, false, y, 0, 1);
