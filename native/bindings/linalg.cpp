@@ -1,3 +1,5 @@
+#include <nanobind/stl/pair.h>
+
 #include "bindings/bindings.hpp"
 
 #include "linalg/cholmod_cholesky.hpp"
@@ -39,7 +41,7 @@ void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
           "forward_sparse",
           [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {
             SupernodalCholesky::Sparse y = f.forward_sparse(view(dofs), view(values));
-            return nb::make_tuple(numpy(std::move(y.row)), numpy(std::move(y.value)));
+            return std::pair(numpy(std::move(y.row)), numpy(std::move(y.value)));
           },
           nb::arg("dofs"), nb::arg("values"),
           "(rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.");
