@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kSmallPanel = 24 * 1024;  // entries; a larger panel is cut up for the cache and for threads
+constexpr double kSharedFlops = 4e6;             // a front of fewer operations is not worth the team's waiting
 constexpr std::int64_t kColumnsPerTask = 32;     // of a matrix that is cleared or added up by a team
 
 std::int64_t rounded(std::int64_t n) {
@@ -103,26 +104,23 @@ std::int64_t SupernodalFactor<T>::factorise(const double* values) {
       // Columns after one that failed already can not be the first.
       for (std::int32_t s = first; s < last && supernodes_.first[s] < failed_; ++s) eliminate_front(s, thread, false);
     }
-    if (failed_ == kNone)
-      for (const std::int32_t s : factor_schedule_.top)
-        if (eliminate_front(s, thread, true) >= 0) break;
+    one_by_one(
+        factor_schedule_.top, [&](std::int32_t s) { return supernodes_.flops(s) > kSharedFlops; },
+        [&](std::int32_t s, bool shared) { eliminate_front(s, thread, shared); }, [&] { return failed_ != kNone; });
   }
   return failed_ == kNone ? -1 : failed_.load();
 }
 
-// Returns the column of the panel that failed, or -1.
 template <class T>
-std::int64_t SupernodalFactor<T>::eliminate_front(std::int32_t s, int thread, bool shared) {
+void SupernodalFactor<T>::eliminate_front(std::int32_t s, int thread, bool shared) {
   assemble(s, values_, shared);
   add_children(s, thread, shared, true);
-  const int bad = factor_panel(s, thread, shared);
-  if (bad >= 0) {
-    report(supernodes_.first[s] + bad);
-    return bad;
+  if (const int bad = factor_panel(s, thread, shared); bad >= 0) {
+    once(shared, [&] { report(supernodes_.first[s] + bad); });
+    return;
   }
   make_update(s, thread, shared);
   add_children(s, thread, shared, false);
-  return -1;
 }
 
 template <class T>

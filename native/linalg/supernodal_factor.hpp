@@ -58,7 +58,7 @@ class SupernodalFactor {
   std::int64_t update_ld(std::int32_t s) const;
 
   void plan(int threads);
-  std::int64_t eliminate_front(std::int32_t s, int thread, bool shared);
+  void eliminate_front(std::int32_t s, int thread, bool shared);
   void assemble(std::int32_t s, const double* values, bool shared);
   void add_children(std::int32_t s, int thread, bool shared, bool into_panel);
   int factor_panel(std::int32_t s, int thread, bool shared);

@@ -2,6 +2,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <ranges>
 
 #include "linalg/supernodal_factor.hpp"
 #include "linalg/teamwork.hpp"
@@ -10,6 +11,7 @@
 namespace qlb {
 namespace {
 
+constexpr std::int64_t kSharedEntries = 100000;  // a panel of fewer entries is not worth the team's waiting
 constexpr std::int64_t kRowsPerTask = 512, kColumnsPerTask = 16;
 
 std::int64_t pieces(std::int64_t n, std::int64_t size) {
@@ -104,6 +106,7 @@ void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared
 template <class T>
 void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
   const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
+  const auto worth = [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; };
 #pragma omp parallel num_threads(threads_) if (threads_ > 1)
   {
     const int thread = omp_get_thread_num();
@@ -112,19 +115,23 @@ void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
     for (std::int64_t k = 0; k < subtrees; ++k)
       for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
         forward_front(s, thread, false, y, ld, sides);
-    for (const std::int32_t s : solve_schedule_.top) forward_front(s, thread, true, y, ld, sides);
+    one_by_one(
+        solve_schedule_.top, worth,
+        [&](std::int32_t s, bool shared) { forward_front(s, thread, shared, y, ld, sides); }, [] { return false; });
   }
 }
 
 template <class T>
 void SupernodalFactor<T>::backward(T* y, std::int64_t ld, int sides) {
   const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
+  const auto worth = [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; };
 #pragma omp parallel num_threads(threads_) if (threads_ > 1)
   {
     const int thread = omp_get_thread_num();
     const FlushSubnormals flush;
-    for (auto s = solve_schedule_.top.rbegin(); s != solve_schedule_.top.rend(); ++s)
-      backward_front(*s, thread, true, y, ld, sides);
+    one_by_one(
+        std::views::reverse(solve_schedule_.top), worth,
+        [&](std::int32_t s, bool shared) { backward_front(s, thread, shared, y, ld, sides); }, [] { return false; });
 #pragma omp for schedule(dynamic, 1)
     for (std::int64_t k = 0; k < subtrees; ++k)
       for (std::int32_t s = solve_schedule_.subtrees[k].last; s-- > solve_schedule_.subtrees[k].first;)
