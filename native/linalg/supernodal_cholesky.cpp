@@ -59,8 +59,7 @@ void SupernodalCholesky::solve_sides(Numeric<T>& numeric, const double* b, doubl
   for (int r = 0; r < sides; ++r)
     for (std::int64_t k = 0; k < n; ++k)
       y[k + r * n] = r < used ? static_cast<T>(b[supernodes_.dof[k] + r * size()]) : T(0);
-  numeric.factor.forward(y, n, sides);
-  numeric.factor.backward(y, n, sides);
+  numeric.factor.solve(y, n, sides);
   for (int r = 0; r < used; ++r) {
     std::fill(x + r * size(), x + (r + 1) * size(), 0.0);
     for (std::int64_t k = 0; k < n; ++k) x[supernodes_.dof[k] + r * size()] = y[k + r * n];
