@@ -1,15 +1,17 @@
-"""Nanoseconds per tetrahedron of the element kernels, at each SIMD level; and the factor's GFlop/s and GB/s."""
+"""Nanoseconds per tetrahedron of the element kernels, at each SIMD level; and the factors' speed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
+from dataclasses import dataclass
+from time import perf_counter, process_time
 
 import numpy as np
 import sympy
 
 import qlb
 from benchmarks.machine import machine_line, markdown
+from benchmarks.pardiso import Pardiso, find_mkl, upper_triangle
 from qlb import _native
 from qlb.materials import MATERIALS, Material
 from qlb.mesh import TetMesh
@@ -64,31 +66,83 @@ def symbolic_stable_neo_hookean(built_in: qlb.StableNeoHookean) -> qlb.SymbolicM
     return qlb.SymbolicMaterial(psi=psi, parameters=dict(zip(("mu", "lam"), built_in.kernel_parameters(), strict=True)))
 
 
+@dataclass
+class Rival:
+    """One kind of factor: how to run it, and what it reads of L in a solve."""
+
+    name: str
+    factorise: Callable[[], object]
+    solve: Callable[[], object]
+    flops: float = float("nan")
+    solve_bytes: float = float("nan")
+
+
+def read_bandwidth(threads: int) -> float:
+    """Bytes per second at which memory is read, in the manner of STREAM: an array far larger than the L2 caches."""
+    a = np.ones(1 << 25)
+    return a.nbytes / best_seconds(lambda: _native.dot(a, a, threads))
+
+
+def rivals(mesh: TetMesh, workers: int) -> list[Rival]:
+    """Every kind of factor of the bar's stage Hessian; CHOLMOD first."""
+    simulation = qlb.Simulation(mesh, material=qlb.StableNeoHookean(), threads=workers)
+    simulation.pin(mesh.nodes_where(lambda x: x[:, 0] < 1e-9))
+    system, matrix = simulation.system, _native.BlockMatrix(simulation.system.pattern)
+    system.elastic.add_hessian(mesh.positions, 1e-4, True, matrix)
+    system.inertia.add_hessian(1.0, matrix)
+    held = (mesh.positions[:, :1] < 1e-9).repeat(3, axis=1).astype(np.uint8)
+    b, x = np.ones_like(mesh.positions), np.empty_like(mesh.positions)
+
+    def rival(name: str, factor: _native.Cholesky, entry: int) -> Rival:
+        read = 2.0 * entry * factor.factor_nonzeros
+        return Rival(name, lambda: factor.factorise(matrix), lambda: factor.apply(b, x), factor.factor_flops, read)
+
+    found = [rival("CHOLMOD float64", _native.CholmodCholesky(system.pattern, held, workers), 8)]
+    for precision, entry in (("float64", 8), ("float32", 4)):
+        ours = _native.SupernodalCholesky(system.pattern, held, workers, precision)
+        found.append(rival(f"ours {precision}", ours, entry))
+    if workers == 1 and (mkl := find_mkl()):
+        pardiso = Pardiso(mkl, upper_triangle(matrix, system.pattern, held.ravel() == 0))
+        found.append(Rival("PARDISO float64", pardiso.factorise, pardiso.solve))
+    return found
+
+
+def interleaved_seconds(runs: list[Callable[[], object]], workers: int, repeats: int = 9) -> list[float]:
+    """The median of each; of CPU time with one thread, so that other jobs of the machine count little."""
+    clock = process_time if workers == 1 else perf_counter
+    seconds: list[list[float]] = [[] for _ in runs]
+    for _ in range(repeats):
+        for run, taken in zip(runs, seconds, strict=True):
+            start = clock()
+            run()
+            taken.append(clock() - start)
+    return [float(np.median(taken)) for taken in seconds]
+
+
 def factor_table(threads: list[int], sizes: list[str]) -> str:
-    """Factorisation and solve of the bar's stage Hessian."""
+    """Factorisation and solve of the bar's stage Hessian, each kind against CHOLMOD and against memory."""
     rows = []
     for cells in sizes:
         mesh = TetMesh.box(cells=tuple(map(int, cells.split(","))))  # type: ignore[arg-type]
         for workers in threads:
-            simulation = qlb.Simulation(mesh, material=qlb.StableNeoHookean(), threads=workers)
-            simulation.pin(mesh.nodes_where(lambda x: x[:, 0] < 1e-9))
-            system, matrix = simulation.system, _native.BlockMatrix(simulation.system.pattern)
-            system.elastic.add_hessian(mesh.positions, 1e-4, True, matrix)
-            system.inertia.add_hessian(1.0, matrix)
-            factor, b = system.analyse(), np.ones_like(mesh.positions)
-            x = np.empty_like(b)
-            made = best_seconds(lambda f=factor, a=matrix: f.factorise(a))
-            solved = best_seconds(lambda f=factor, x=x, b=b: f.apply(b, x))
-            rows.append(
-                [
-                    str(len(mesh.tets)),
-                    str(workers),
-                    f"{factor.factor_nonzeros / 1e6:.2f}",
-                    f"{1e3 * made:.2f}",
-                    f"{factor.factor_flops / made / 1e9:.1f}",
-                    f"{1e3 * solved:.2f}",
-                    f"{16 * factor.factor_nonzeros / solved / 1e9:.1f}",
-                ]
-            )
-    header = ["tets", "threads", "nnz(L) 1e6", "factor ms", "GFlop/s", "solve ms", "GB/s"]
-    return f"### Factor and solve (CHOLMOD)\n\n{machine_line(max(threads))}.\n\n{markdown(header, rows)}"
+            kinds, bandwidth = rivals(mesh, workers), read_bandwidth(workers)
+            made = interleaved_seconds([kind.factorise for kind in kinds], workers)
+            solved = interleaved_seconds([kind.solve for kind in kinds], workers, repeats=25)
+            for kind, factor, solve in zip(kinds, made, solved, strict=True):
+                rows.append(
+                    [
+                        f"{len(mesh.tets)}",
+                        f"{workers}",
+                        kind.name,
+                        f"{1e3 * factor:.2f}",
+                        f"{made[0] / factor:.2f}",
+                        f"{kind.flops / factor / 1e9:.1f}",
+                        f"{1e3 * solve:.3f}",
+                        f"{solved[0] / solve:.2f}",
+                        f"{kind.solve_bytes / solve / 1e9:.1f}",
+                        f"{kind.solve_bytes / solve / bandwidth:.2f}",
+                    ]
+                )
+    header = ["tets", "threads", "factor", "ms", "speed-up", "GFlop/s", "solve ms", "speed-up", "GB/s", "of memory"]
+    note = 'Speed-ups over CHOLMOD; "of memory": L read twice, against the bandwidth of reading 256 MB.'
+    return f"### Factor and solve\n\n{note} {machine_line(max(threads))}.\n\n{markdown(header, rows)}"

@@ -1,3 +1,5 @@
+#include <nanobind/stl/pair.h>
+
 #include "bindings/bindings.hpp"
 
 #include "linalg/lbfgs.hpp"
@@ -36,10 +38,14 @@ void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
           },
           nb::arg("y"), nb::arg("x").noconvert(), ReleaseGil(), "x = P^T L^-T y, y in elimination order.")
       .def(
+          "set_precision",
+          [](SupernodalCholesky& f, const std::string& precision) { f.set_precision(precision_named(precision)); },
+          nb::arg("precision"), "Go on in another precision; the factor in place is lost.")
+      .def(
           "forward_sparse",
           [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {
             SupernodalCholesky::Sparse y = f.forward_sparse(view(dofs), view(values));
-            return nb::make_tuple(numpy(std::move(y.row)), numpy(std::move(y.value)));
+            return std::pair(numpy(std::move(y.row)), numpy(std::move(y.value)));
           },
           nb::arg("dofs"), nb::arg("values"),
           "(rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.");
@@ -70,7 +76,7 @@ void bind_supernodal(nb::module_& m) {
           [](const SupernodalCholesky& f) {
             return numpy(std::vector<std::int64_t>(f.order().begin(), f.order().end()));
           },
-          "Degree of freedom of each row in elimination order.")
+          nb::rv_policy::move, "Degree of freedom of each row in elimination order.")
       .def_prop_ro("bytes", &SupernodalCholesky::bytes, "Memory of L.")
       .def_prop_ro("solve_bytes", &SupernodalCholesky::solve_bytes, "Bytes of L that one solve reads.");
   bind_half_solves(type);

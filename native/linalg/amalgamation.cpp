@@ -17,7 +17,7 @@ struct Group {
 // (whose bytes each solve reads too), its update matrix (stored, then added into the parent), and the arithmetic.
 double front_cost(double columns, double below) {
   const double front = columns + below;
-  return 12000.0 + 16.0 * columns * front + 14.0 * below * below + front_flops(columns, below);
+  return 4000.0 + 16.0 * columns * front + 14.0 * below * below + front_flops(columns, below);
 }
 
 std::vector<Group> fundamental_supernodes(const Graph& graph, std::span<const std::int32_t> weight,

@@ -12,7 +12,7 @@ namespace qlb {
 
 constexpr int kBlock = 16;      // columns eliminated at once
 constexpr int kWide = 128;      // columns of a wide panel that are finished together
-constexpr int kTask = 192;      // rows and columns of the pieces that threads share
+constexpr int kTask = 384;      // rows and columns of the pieces that threads share
 constexpr int kDepth = 256;     // depth of a product that is packed at once
 constexpr int kPadding = 16;    // entries that kernels may read past a matrix; its values do not matter but are finite
 constexpr int kRightSides = 8;  // right-hand sides solved together

@@ -5,8 +5,6 @@
 namespace qlb {
 namespace {
 
-constexpr double kPiecesPerThread = 4.0;  // subtrees are split until they are that much smaller than a thread's share
-
 class TwoStacks {
  public:
   TwoStacks(const Supernodes& supernodes, std::span<const std::int64_t> size, std::vector<std::int64_t>& offset)
@@ -40,7 +38,7 @@ class TwoStacks {
 
 }  // namespace
 
-Schedule make_schedule(const Supernodes& supernodes, std::span<const double> work, int threads) {
+Schedule make_schedule(const Supernodes& supernodes, std::span<const double> work, int threads, double pieces) {
   const std::int32_t count = supernodes.count();
   Schedule schedule;
   if (threads <= 1) {
@@ -59,7 +57,7 @@ Schedule make_schedule(const Supernodes& supernodes, std::span<const double> wor
   }
   const auto lighter = [&](std::int32_t a, std::int32_t b) { return subtree[a] < subtree[b]; };
   std::make_heap(open.begin(), open.end(), lighter);
-  while (!open.empty() && subtree[open.front()] > total / (kPiecesPerThread * threads)) {
+  while (!open.empty() && subtree[open.front()] > total / (pieces * threads)) {
     std::pop_heap(open.begin(), open.end(), lighter);
     schedule.top.push_back(open.back());
     open.pop_back();

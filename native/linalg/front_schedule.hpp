@@ -19,7 +19,8 @@ struct Schedule {
   std::vector<std::int32_t> top;
 };
 
-Schedule make_schedule(const Supernodes& supernodes, std::span<const double> work, int threads);
+// Subtrees are split until the largest is `pieces` times smaller than a thread's share of the work.
+Schedule make_schedule(const Supernodes& supernodes, std::span<const double> work, int threads, double pieces);
 
 // Room for one pending block per supernode, from when it is made until its parent has taken it.
 //

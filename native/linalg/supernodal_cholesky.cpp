@@ -1,6 +1,7 @@
 #include "linalg/supernodal_cholesky.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace qlb {
@@ -12,11 +13,23 @@ Supernodes checked_supernodes(const BlockPattern& pattern, std::span<const std::
   return find_supernodes(pattern, fixed);
 }
 
+// The power of two nearest above the largest entry: a right-hand side divided by it cannot overflow or vanish in float.
+double power_above(const double* b, std::int64_t size) {
+  double largest = 0.0;
+  for (std::int64_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(b[k]));
+  int exponent = 0;
+  if (std::isfinite(largest)) std::frexp(largest, &exponent);
+  return std::ldexp(1.0, std::clamp(exponent, -1000, 1000));
+}
+
 }  // namespace
 
 SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed,
                                        int threads, Precision precision, const std::string& simd)
-    : pattern_(std::move(pattern)), supernodes_(checked_supernodes(*pattern_, fixed)), threads_(std::max(threads, 1)) {
+    : pattern_(std::move(pattern)),
+      supernodes_(checked_supernodes(*pattern_, fixed)),
+      threads_(std::max(threads, 1)),
+      simd_(simd) {
   row_of_dof_.assign(size(), -1);
   for (std::int64_t k = 0; k < rows(); ++k) row_of_dof_[supernodes_.dof[k]] = static_cast<std::int32_t>(k);
   owner_.resize(rows());
@@ -25,8 +38,13 @@ SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> patte
     nonzeros_ += supernodes_.nonzeros(s);
     flops_ += supernodes_.flops(s);
   }
+  set_precision(precision);
+}
+
+void SupernodalCholesky::set_precision(Precision precision) {
+  ready_ = false;
   const auto make = [&]<class T>(T) {
-    numeric_ = std::unique_ptr<Numeric<T>>(new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd),
+    numeric_ = std::unique_ptr<Numeric<T>>(new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd_),
                                                           HugeBuffer<T>(kRightSides * rows()), std::vector<T>(rows())});
   };
   if (precision == Precision::float32)
@@ -56,14 +74,17 @@ template <class T>
 void SupernodalCholesky::solve_sides(Numeric<T>& numeric, const double* b, double* x, int used, int sides) {
   const std::int64_t n = rows();
   T* y = numeric.y.data();
-  for (int r = 0; r < sides; ++r)
+  double scale[kRightSides];
+  for (int r = 0; r < sides; ++r) {
+    scale[r] = r < used ? power_above(b + r * size(), size()) : 1.0;
+    const double inverse = 1.0 / scale[r];
     for (std::int64_t k = 0; k < n; ++k)
-      y[k + r * n] = r < used ? static_cast<T>(b[supernodes_.dof[k] + r * size()]) : T(0);
-  numeric.factor.forward(y, n, sides);
-  numeric.factor.backward(y, n, sides);
+      y[k + r * n] = r < used ? static_cast<T>(inverse * b[supernodes_.dof[k] + r * size()]) : T(0);
+  }
+  numeric.factor.solve(y, n, sides);
   for (int r = 0; r < used; ++r) {
     std::fill(x + r * size(), x + (r + 1) * size(), 0.0);
-    for (std::int64_t k = 0; k < n; ++k) x[supernodes_.dof[k] + r * size()] = y[k + r * n];
+    for (std::int64_t k = 0; k < n; ++k) x[supernodes_.dof[k] + r * size()] = scale[r] * y[k + r * n];
   }
 }
 

@@ -23,6 +23,9 @@ class SupernodalCholesky : public Cholesky {
   SupernodalCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed, int threads,
                      Precision precision, const std::string& simd = "");
 
+  // Goes on in another precision; the factor in place is lost.
+  void set_precision(Precision precision);
+
   std::int64_t size() const override { return 3 * pattern_->nodes(); }
   std::int64_t rows() const { return static_cast<std::int64_t>(supernodes_.dof.size()); }
   std::int64_t factorise(const BlockMatrix& matrix) override;
@@ -68,6 +71,7 @@ class SupernodalCholesky : public Cholesky {
   std::int64_t nonzeros_ = 0;
   double flops_ = 0.0;
   int threads_;
+  std::string simd_;
   bool ready_ = false;
   AnyNumeric numeric_;
 };

@@ -4,15 +4,19 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "linalg/teamwork.hpp"
+#include "simd/flush_subnormals.hpp"
 
 namespace qlb {
 namespace {
 
 constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kSmallPanel = 24 * 1024;  // entries; a larger panel is cut up for the cache and for threads
-constexpr std::int64_t kColumnsPerTask = 32;     // of a matrix that is cleared or added up by a team
+constexpr double kThreadedFlops = 5e7, kThreadedEntries = 5e5;  // less in all is not worth a second thread
+constexpr double kSharedFlops = 4e6;          // a front of fewer operations is not worth the team's waiting
+constexpr std::int64_t kColumnsPerTask = 32;  // of a matrix that is cleared or added up by a team
 
 std::int64_t rounded(std::int64_t n) {
   return (n + kPadding - 1) / kPadding * kPadding;
@@ -26,10 +30,7 @@ std::int64_t pieces(std::int64_t n, std::int64_t size) {
 template <class T>
 SupernodalFactor<T>::SupernodalFactor(const Supernodes& supernodes, const BlockPattern& pattern, int threads,
                                       const std::string& simd)
-    : supernodes_(supernodes),
-      kernels_(find_dense_kernels<T>(simd)),
-      map_(map_assembly(supernodes, pattern)),
-      threads_(threads) {
+    : supernodes_(supernodes), kernels_(find_dense_kernels<T>(simd)), map_(map_assembly(supernodes, pattern)) {
   panel_begin_.push_back(0);
   for (std::int32_t s = 0; s < supernodes.count(); ++s)
     panel_begin_.push_back(panel_begin_.back() + rounded(supernodes.front(s) * supernodes.columns(s) + kPadding));
@@ -47,19 +48,21 @@ std::int64_t SupernodalFactor<T>::update_ld(std::int32_t s) const {
 template <class T>
 void SupernodalFactor<T>::plan(int threads) {
   const std::int32_t count = supernodes_.count();
-  std::vector<double> flops(count), bytes(count);
+  std::vector<double> flops(count), entries(count);
   std::vector<std::int64_t> update_size(count), side_size(count);
   std::int64_t longest = 0;
   for (std::int32_t s = 0; s < count; ++s) {
     const double below = static_cast<double>(supernodes_.rows_below(s));
     flops[s] = supernodes_.flops(s) + 10.0 * below * below;
-    bytes[s] = static_cast<double>(supernodes_.nonzeros(s));
+    entries[s] = static_cast<double>(supernodes_.nonzeros(s));
     update_size[s] = below > 0 ? rounded(update_ld(s) * supernodes_.rows_below(s) + kPadding) : 0;
     side_size[s] = kRightSides * rounded(supernodes_.rows_below(s));
     longest = std::max(longest, supernodes_.front(s));
   }
-  factor_schedule_ = make_schedule(supernodes_, flops, threads);
-  solve_schedule_ = make_schedule(supernodes_, bytes, threads);
+  factor_threads_ = std::accumulate(flops.begin(), flops.end(), 0.0) < kThreadedFlops ? 1 : threads;
+  solve_threads_ = std::accumulate(entries.begin(), entries.end(), 0.0) < kThreadedEntries ? 1 : threads;
+  factor_schedule_ = make_schedule(supernodes_, flops, factor_threads_, 4.0);
+  solve_schedule_ = make_schedule(supernodes_, entries, solve_threads_, 2.0);
   updates_ = place_blocks(supernodes_, factor_schedule_, update_size);
   sides_ = place_blocks(supernodes_, solve_schedule_, side_size);
   shared_updates_ = HugeBuffer<T>(updates_.shared_size);
@@ -92,35 +95,34 @@ std::int64_t SupernodalFactor<T>::factorise(const double* values) {
   values_ = values;
   failed_ = kNone;
   const auto subtrees = static_cast<std::int64_t>(factor_schedule_.subtrees.size());
-#pragma omp parallel num_threads(threads_) if (threads_ > 1)
+  // The first column that fails counts; what is before it must still be tried, whoever finds it.
+  const auto after_failure = [&](std::int32_t s) { return supernodes_.first[s] >= failed_; };
+#pragma omp parallel num_threads(factor_threads_) if (factor_threads_ > 1)
   {
     const int thread = omp_get_thread_num();
+    const FlushSubnormals flush;
 #pragma omp for schedule(dynamic, 1)
     for (std::int64_t k = 0; k < subtrees; ++k) {
       const auto [first, last] = factor_schedule_.subtrees[k];
-      // Columns after one that failed already can not be the first.
-      for (std::int32_t s = first; s < last && supernodes_.first[s] < failed_; ++s) eliminate_front(s, thread, false);
+      for (std::int32_t s = first; s < last && !after_failure(s); ++s) eliminate_front(s, thread, false);
     }
-    if (failed_ == kNone)
-      for (const std::int32_t s : factor_schedule_.top)
-        if (eliminate_front(s, thread, true) >= 0) break;
+    one_by_one(
+        factor_schedule_.top, [&](std::int32_t s) { return supernodes_.flops(s) > kSharedFlops; },
+        [&](std::int32_t s, bool shared) { eliminate_front(s, thread, shared); }, after_failure);
   }
   return failed_ == kNone ? -1 : failed_.load();
 }
 
-// Returns the column of the panel that failed, or -1.
 template <class T>
-std::int64_t SupernodalFactor<T>::eliminate_front(std::int32_t s, int thread, bool shared) {
+void SupernodalFactor<T>::eliminate_front(std::int32_t s, int thread, bool shared) {
   assemble(s, values_, shared);
   add_children(s, thread, shared, true);
-  const int bad = factor_panel(s, thread, shared);
-  if (bad >= 0) {
-    report(supernodes_.first[s] + bad);
-    return bad;
+  if (const int bad = factor_panel(s, thread, shared); bad >= 0) {
+    once(shared, [&] { report(supernodes_.first[s] + bad); });
+    return;
   }
   make_update(s, thread, shared);
   add_children(s, thread, shared, false);
-  return -1;
 }
 
 template <class T>

@@ -46,6 +46,7 @@ class SupernodalFactor {
   // y := L^-1 y and y := L^-T y for `sides` (1 or kRightSides) vectors in elimination order, `ld` apart.
   void forward(T* y, std::int64_t ld, int sides);
   void backward(T* y, std::int64_t ld, int sides);
+  void solve(T* y, std::int64_t ld, int sides);  // one after the other
   // y := L^-1 y over some supernodes only, ascending, with all their ancestors; y is zero in all others.
   void forward_along(std::span<const std::int32_t> path, T* y);
 
@@ -58,7 +59,7 @@ class SupernodalFactor {
   std::int64_t update_ld(std::int32_t s) const;
 
   void plan(int threads);
-  std::int64_t eliminate_front(std::int32_t s, int thread, bool shared);
+  void eliminate_front(std::int32_t s, int thread, bool shared);
   void assemble(std::int32_t s, const double* values, bool shared);
   void add_children(std::int32_t s, int thread, bool shared, bool into_panel);
   int factor_panel(std::int32_t s, int thread, bool shared);
@@ -68,6 +69,8 @@ class SupernodalFactor {
 
   void gather_forward(std::int32_t s, int thread, const T* y, std::int64_t ld, int sides, T* x);
   void gather_backward(std::int32_t s, const T* y, std::int64_t ld, int sides, T* x);
+  void forward_team(T* y, std::int64_t ld, int sides);
+  void backward_team(T* y, std::int64_t ld, int sides);
   void forward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides);
   void backward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides);
   T* side_work(int thread, bool shared) { return (shared ? shared_sides_ : side_work_[thread]).data(); }
@@ -77,7 +80,7 @@ class SupernodalFactor {
   AssemblyMap map_;
   std::vector<std::int64_t> panel_begin_;
   HugeBuffer<T> panels_;
-  int threads_;
+  int factor_threads_, solve_threads_;  // as many as pay
 
   Schedule factor_schedule_, solve_schedule_;
   Placement updates_, sides_;  // of update matrices; of the vectors that solves pass up

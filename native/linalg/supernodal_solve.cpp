@@ -2,13 +2,16 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <ranges>
 
 #include "linalg/supernodal_factor.hpp"
 #include "linalg/teamwork.hpp"
+#include "simd/flush_subnormals.hpp"
 
 namespace qlb {
 namespace {
 
+constexpr std::int64_t kSharedEntries = 400000;  // a panel of fewer entries is not worth the team's waiting
 constexpr std::int64_t kRowsPerTask = 512, kColumnsPerTask = 16;
 
 std::int64_t pieces(std::int64_t n, std::int64_t size) {
@@ -101,36 +104,60 @@ void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared
 }
 
 template <class T>
-void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
+void SupernodalFactor<T>::forward_team(T* y, std::int64_t ld, int sides) {
+  const int thread = omp_get_thread_num();
+  const FlushSubnormals flush;
   const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
-#pragma omp parallel num_threads(threads_) if (threads_ > 1)
-  {
-    const int thread = omp_get_thread_num();
 #pragma omp for schedule(dynamic, 1)
-    for (std::int64_t k = 0; k < subtrees; ++k)
-      for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
-        forward_front(s, thread, false, y, ld, sides);
-    for (const std::int32_t s : solve_schedule_.top) forward_front(s, thread, true, y, ld, sides);
-  }
+  for (std::int64_t k = 0; k < subtrees; ++k)
+    for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
+      forward_front(s, thread, false, y, ld, sides);
+  one_by_one(
+      solve_schedule_.top, [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; },
+      [&](std::int32_t s, bool shared) { forward_front(s, thread, shared, y, ld, sides); },
+      [](std::int32_t) { return false; });
+}
+
+template <class T>
+void SupernodalFactor<T>::backward_team(T* y, std::int64_t ld, int sides) {
+  const int thread = omp_get_thread_num();
+  const FlushSubnormals flush;
+  const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
+  one_by_one(
+      std::views::reverse(solve_schedule_.top),
+      [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; },
+      [&](std::int32_t s, bool shared) { backward_front(s, thread, shared, y, ld, sides); },
+      [](std::int32_t) { return false; });
+#pragma omp for schedule(dynamic, 1)
+  for (std::int64_t k = 0; k < subtrees; ++k)
+    for (std::int32_t s = solve_schedule_.subtrees[k].last; s-- > solve_schedule_.subtrees[k].first;)
+      backward_front(s, thread, false, y, ld, sides);
+}
+
+template <class T>
+void SupernodalFactor<T>::forward(T* y, std::int64_t ld, int sides) {
+#pragma omp parallel num_threads(solve_threads_) if (solve_threads_ > 1)
+  forward_team(y, ld, sides);
 }
 
 template <class T>
 void SupernodalFactor<T>::backward(T* y, std::int64_t ld, int sides) {
-  const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
-#pragma omp parallel num_threads(threads_) if (threads_ > 1)
+#pragma omp parallel num_threads(solve_threads_) if (solve_threads_ > 1)
+  backward_team(y, ld, sides);
+}
+
+template <class T>
+void SupernodalFactor<T>::solve(T* y, std::int64_t ld, int sides) {
+#pragma omp parallel num_threads(solve_threads_) if (solve_threads_ > 1)
   {
-    const int thread = omp_get_thread_num();
-    for (auto s = solve_schedule_.top.rbegin(); s != solve_schedule_.top.rend(); ++s)
-      backward_front(*s, thread, true, y, ld, sides);
-#pragma omp for schedule(dynamic, 1)
-    for (std::int64_t k = 0; k < subtrees; ++k)
-      for (std::int32_t s = solve_schedule_.subtrees[k].last; s-- > solve_schedule_.subtrees[k].first;)
-        backward_front(s, thread, false, y, ld, sides);
+    forward_team(y, ld, sides);
+    backward_team(y, ld, sides);
   }
 }
 
 template <class T>
 void SupernodalFactor<T>::forward_along(std::span<const std::int32_t> path, T* y) {
+  const FlushSubnormals flush;
   on_path_.assign(supernodes_.count(), 0);
   for (const std::int32_t s : path) on_path_[s] = 1;
   for (const std::int32_t s : path) forward_front(s, 0, false, y, 0, 1);
@@ -141,6 +168,8 @@ template void SupernodalFactor<float>::forward(float*, std::int64_t, int);
 template void SupernodalFactor<double>::forward(double*, std::int64_t, int);
 template void SupernodalFactor<float>::backward(float*, std::int64_t, int);
 template void SupernodalFactor<double>::backward(double*, std::int64_t, int);
+template void SupernodalFactor<float>::solve(float*, std::int64_t, int);
+template void SupernodalFactor<double>::solve(double*, std::int64_t, int);
 template void SupernodalFactor<float>::forward_along(std::span<const std::int32_t>, float*);
 template void SupernodalFactor<double>::forward_along(std::span<const std::int32_t>, double*);
 

@@ -160,7 +160,10 @@ class SupernodalCholesky(Cholesky):
     def backward(self, y: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """x = P^T L^-T y, y in elimination order."""
 
-    def forward_sparse(self, dofs: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> tuple:
+    def set_precision(self, precision: str) -> None:
+        """Go on in another precision; the factor in place is lost."""
+
+    def forward_sparse(self, dofs: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.int64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]:
         """
         (rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.
         """

@@ -1,14 +1,31 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import scipy.sparse
 import scipy.sparse.linalg
+from numpy.typing import NDArray
 
 from qlb import TetMesh, _native
 from tests.support import Array, dense, elastic_hessian, jittered, make_system, node_blocks
 
+Analyse = Callable[[_native.BlockPattern, NDArray[np.uint8], int], _native.Cholesky]
+
+
+def supernodal(pattern: _native.BlockPattern, fixed: NDArray[np.uint8], threads: int) -> _native.SupernodalCholesky:
+    return _native.SupernodalCholesky(pattern, fixed, threads, "float64")
+
+
+KINDS: dict[str, Analyse] = {"cholmod": _native.CholmodCholesky, "supernodal": supernodal}
 SELECTIONS = ["none", "one end", "single axes", "all but one", "all"]
+
+
+@pytest.fixture(params=list(KINDS))
+def analyse(request: pytest.FixtureRequest) -> Analyse:
+    """The kind of factor under test."""
+    return KINDS[request.param]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +44,7 @@ def matrix(mesh: TetMesh) -> _native.BlockMatrix:
 
 
 @pytest.fixture(params=SELECTIONS)
-def fixed(request: pytest.FixtureRequest, mesh: TetMesh) -> Array:
+def fixed(request: pytest.FixtureRequest, mesh: TetMesh) -> NDArray[np.uint8]:
     mask = np.zeros(mesh.positions.shape, dtype=np.uint8)
     mask[mesh.positions[:, 0] < 1e-9] = {"none": (0, 0, 0), "single axes": (1, 0, 0)}.get(request.param, (1, 1, 1))
     if request.param == "single axes":
@@ -58,10 +75,15 @@ def solve(cholesky: _native.Cholesky, b: Array) -> Array:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_solution_is_that_of_numpy(
-    mesh: TetMesh, matrix: _native.BlockMatrix, fixed: Array, threads: int, rng: np.random.Generator
+    analyse: Analyse,
+    mesh: TetMesh,
+    matrix: _native.BlockMatrix,
+    fixed: NDArray[np.uint8],
+    threads: int,
+    rng: np.random.Generator,
 ) -> None:
     pattern = pattern_of(mesh)
-    cholesky = _native.CholmodCholesky(pattern, fixed, threads)
+    cholesky = analyse(pattern, fixed, threads)
     A = copied(matrix, pattern)
     assert cholesky.factorise(A) == -1
     b = rng.normal(size=mesh.positions.shape)
@@ -72,7 +94,7 @@ def test_solution_is_that_of_numpy(
     np.testing.assert_allclose(x.ravel(), expected, rtol=0, atol=1e-11 * np.abs(expected).max(initial=1e-300))
 
 
-def test_solution_is_that_of_scipy_on_a_larger_mesh(rng: np.random.Generator) -> None:
+def test_solution_is_that_of_scipy_on_a_larger_mesh(analyse: Analyse, rng: np.random.Generator) -> None:
     mesh = TetMesh.box((1.0, 0.5, 0.5), cells=(12, 6, 6))
     system = make_system(mesh)
     A = elastic_hessian(system, mesh.positions, project=True)
@@ -84,7 +106,7 @@ def test_solution_is_that_of_scipy_on_a_larger_mesh(rng: np.random.Generator) ->
     row = np.broadcast_to(3 * i[:, None, None] + np.arange(3)[:, None], blocks.shape)
     column = np.broadcast_to(3 * j[:, None, None] + np.arange(3), blocks.shape)
     sparse = scipy.sparse.csc_matrix((blocks.ravel(), (row.ravel(), column.ravel())))
-    cholesky = system.analyse()
+    cholesky = analyse(system.pattern, np.zeros(mesh.positions.shape, dtype=np.uint8), 1)
     assert cholesky.factorise(A) == -1
     b = rng.normal(size=mesh.positions.shape)
     expected = scipy.sparse.linalg.spsolve(sparse, b.ravel())
@@ -92,10 +114,10 @@ def test_solution_is_that_of_scipy_on_a_larger_mesh(rng: np.random.Generator) ->
 
 
 def test_held_degrees_of_freedom_are_zero_and_do_not_count(
-    mesh: TetMesh, matrix: _native.BlockMatrix, fixed: Array, rng: np.random.Generator
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix, fixed: NDArray[np.uint8], rng: np.random.Generator
 ) -> None:
     pattern = pattern_of(mesh)
-    cholesky = _native.CholmodCholesky(pattern, fixed, 1)
+    cholesky = analyse(pattern, fixed, 1)
     cholesky.factorise(copied(matrix, pattern))
     b = rng.normal(size=mesh.positions.shape)
     x = solve(cholesky, b)
@@ -103,31 +125,33 @@ def test_held_degrees_of_freedom_are_zero_and_do_not_count(
     np.testing.assert_array_equal(solve(cholesky, np.where(fixed == 1, 1e9, b)), x)
 
 
-def test_solve_before_a_factor_is_refused(mesh: TetMesh) -> None:
-    cholesky = _native.CholmodCholesky(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+def test_solve_before_a_factor_is_refused(analyse: Analyse, mesh: TetMesh) -> None:
+    cholesky = analyse(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     with pytest.raises(RuntimeError, match="factorise first"):
         solve(cholesky, np.ones_like(mesh.positions))
 
 
-def test_factor_of_another_pattern_is_refused(mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
-    cholesky = _native.CholmodCholesky(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+def test_factor_of_another_pattern_is_refused(analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
+    cholesky = analyse(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     with pytest.raises(ValueError, match="another pattern"):
         cholesky.factorise(matrix)
 
 
-def test_wrong_sizes_are_refused(mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
+def test_wrong_sizes_are_refused(analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
     pattern = pattern_of(mesh)
     with pytest.raises(ValueError, match="one entry per degree of freedom"):
-        _native.CholmodCholesky(pattern, np.zeros(7, dtype=np.uint8), 1)
-    cholesky = _native.CholmodCholesky(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+        analyse(pattern, np.zeros(7, dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     cholesky.factorise(copied(matrix, pattern))
     with pytest.raises(ValueError, match="has 3 entries, expected 240"):
         solve(cholesky, np.ones((1, 3)))
 
 
-def test_the_same_object_factorises_again(mesh: TetMesh, matrix: _native.BlockMatrix, rng: np.random.Generator) -> None:
+def test_the_same_object_factorises_again(
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix, rng: np.random.Generator
+) -> None:
     pattern = pattern_of(mesh)
-    cholesky = _native.CholmodCholesky(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     A, b = copied(matrix, pattern), rng.normal(size=mesh.positions.shape)
     cholesky.factorise(A)
     first = solve(cholesky, b)
@@ -149,59 +173,61 @@ def islands(values: Array) -> tuple[_native.BlockPattern, _native.BlockMatrix]:
 
 
 @pytest.mark.parametrize("bad", [(0, 0), (3, 1), (9, 2)])
-def test_a_negative_pivot_is_named(bad: tuple[int, int]) -> None:
+def test_a_negative_pivot_is_named(analyse: Analyse, bad: tuple[int, int]) -> None:
     node, axis = bad
     blocks = np.tile(2.0 * np.eye(3), (10, 1, 1))
     blocks[node, axis, axis] = -1.0
     pattern, matrix = islands(blocks)
-    cholesky = _native.CholmodCholesky(pattern, np.zeros((10, 3), dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros((10, 3), dtype=np.uint8), 1)
     assert cholesky.factorise(matrix) == 3 * node + axis
 
 
-def test_a_zero_pivot_is_named() -> None:
+def test_a_zero_pivot_is_named(analyse: Analyse) -> None:
     blocks = np.tile(2.0 * np.eye(3), (4, 1, 1))
     blocks[2, 0, 0] = 0.0
     pattern, matrix = islands(blocks)
-    assert _native.CholmodCholesky(pattern, np.zeros((4, 3), dtype=np.uint8), 1).factorise(matrix) == 6
+    assert analyse(pattern, np.zeros((4, 3), dtype=np.uint8), 1).factorise(matrix) == 6
 
 
 @pytest.mark.parametrize("node", [0, 11, 40, 79])
 def test_a_negative_pivot_of_a_whole_mesh_is_at_the_node_that_is_wrong(
-    mesh: TetMesh, matrix: _native.BlockMatrix, node: int
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix, node: int
 ) -> None:
     pattern = pattern_of(mesh)
     A = copied(matrix, pattern)
     diagonal = np.asarray(pattern.column_begin)[node]
     A.values[diagonal, 1, 1] -= 1e3 * np.abs(A.values).max()
-    cholesky = _native.CholmodCholesky(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     assert cholesky.factorise(A) == 3 * node + 1
 
 
 @pytest.mark.parametrize("fixed", SELECTIONS[:-1], indirect=True)
 def test_a_pivot_among_held_nodes_is_named_by_its_place_in_the_mesh(
-    mesh: TetMesh, matrix: _native.BlockMatrix, fixed: Array
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix, fixed: NDArray[np.uint8]
 ) -> None:
     free = np.flatnonzero(fixed.ravel() == 0)
     dof = int(free[len(free) // 2])
     pattern = pattern_of(mesh)
     A = copied(matrix, pattern)
     A.values[np.asarray(pattern.column_begin)[dof // 3], dof % 3, dof % 3] -= 1e3 * np.abs(A.values).max()
-    assert _native.CholmodCholesky(pattern, fixed, 1).factorise(A) == dof
+    assert analyse(pattern, fixed, 1).factorise(A) == dof
 
 
-def test_an_indefinite_held_part_does_not_matter(mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
+def test_an_indefinite_held_part_does_not_matter(analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
     pattern = pattern_of(mesh)
     A = copied(matrix, pattern)
     A.values[np.asarray(pattern.column_begin)[7], 2, 2] = -1e9
     mask = np.zeros_like(mesh.positions, dtype=np.uint8)
     mask[7, 2] = 1
-    assert _native.CholmodCholesky(pattern, mask, 1).factorise(A) == -1
+    assert analyse(pattern, mask, 1).factorise(A) == -1
 
 
-def test_a_failed_factor_cannot_solve_until_it_succeeds(mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
+def test_a_failed_factor_cannot_solve_until_it_succeeds(
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix
+) -> None:
     pattern = pattern_of(mesh)
     A = copied(matrix, pattern)
-    cholesky = _native.CholmodCholesky(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     b = np.ones_like(mesh.positions)
     assert cholesky.factorise(A) == -1
     good = solve(cholesky, b)
@@ -214,17 +240,19 @@ def test_a_failed_factor_cannot_solve_until_it_succeeds(mesh: TetMesh, matrix: _
     np.testing.assert_array_equal(solve(cholesky, b), good)
 
 
-def test_a_matrix_that_is_not_finite_is_not_positive_definite(mesh: TetMesh, matrix: _native.BlockMatrix) -> None:
+def test_a_matrix_that_is_not_finite_is_not_positive_definite(
+    analyse: Analyse, mesh: TetMesh, matrix: _native.BlockMatrix
+) -> None:
     pattern = pattern_of(mesh)
     A = copied(matrix, pattern)
     A.values[3, 0, 0] = np.nan
-    cholesky = _native.CholmodCholesky(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+    cholesky = analyse(pattern, np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     assert cholesky.factorise(A) >= 0
 
 
-def test_factor_sizes_are_plausible(mesh: TetMesh) -> None:
+def test_factor_sizes_are_plausible(analyse: Analyse, mesh: TetMesh) -> None:
     n = mesh.positions.size
-    cholesky = _native.CholmodCholesky(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
+    cholesky = analyse(pattern_of(mesh), np.zeros_like(mesh.positions, dtype=np.uint8), 1)
     pattern = pattern_of(mesh)
     entries = 9 * (pattern.blocks - pattern.nodes) + 6 * pattern.nodes
     assert entries <= cholesky.factor_nonzeros <= n * (n + 1) // 2
