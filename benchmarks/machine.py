@@ -15,7 +15,7 @@ def machine_line(threads: int) -> str:
     libraries = _native.libraries()
     return (
         f"{_processor()}, {_native.simd_levels()[-1]}, {threads} thread{'s' if threads > 1 else ''};"
-        f" qlb {qlb.__version__}, CHOLMOD {_native.cholmod_version}, {' '.join(libraries['OpenBLAS'].split()[:2])},"
+        f" qlb {qlb.__version__}, CHOLMOD {_native.cholmod_version}, {' '.join(_native.openblas_version.split()[:2])},"
         f" gcc {libraries['compiler']}, Python {platform.python_version()}; {date.today().isoformat()}"
     )
 

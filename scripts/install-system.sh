@@ -7,9 +7,9 @@ packages="build-essential cmake ninja-build pkg-config python3-dev python3-venv
   libegl1 libegl-mesa0 libgl1-mesa-dri"
 
 if ! command -v apt-get >/dev/null 2>&1; then
-  echo "No apt-get here. Needed: a C++20 compiler, cmake, ninja, pkg-config, OpenBLAS, METIS, xsimd (and SuiteSparse for the tests)." >&2
-  echo "  macOS:  brew install cmake ninja pkg-config openblas metis xsimd libomp" >&2
-  echo "  conda:  conda install -c conda-forge cxx-compiler cmake ninja pkg-config openblas metis xsimd" >&2
+  echo "No apt-get here. Needed: a C++20 compiler, cmake, ninja, pkg-config, METIS, xsimd (and OpenBLAS, SuiteSparse for the tests)." >&2
+  echo "  macOS:  brew install cmake ninja pkg-config metis xsimd libomp" >&2
+  echo "  conda:  conda install -c conda-forge cxx-compiler cmake ninja pkg-config metis xsimd" >&2
   exit 0
 fi
 

@@ -1,3 +1,4 @@
+#include <cblas.h>
 #include <cholmod.h>
 
 #include "bindings/bindings.hpp"
@@ -15,6 +16,7 @@ void bind_cholmod(nb::module_& m) {
 
   int version[3];
   cholmod_l_version(version);
+  m.attr("openblas_version") = openblas_get_config();
   m.attr("cholmod_version") =
       std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2]);
 }

@@ -2,7 +2,6 @@
 
 #include <nanobind/stl/map.h>
 
-#include <cblas.h>
 #include <metis.h>
 
 #include "elements/dispatch.hpp"
@@ -18,7 +17,6 @@ NB_MODULE(_native, m) {
   m.def("material_names", &material_names);
   m.def("libraries", [] {
     std::map<std::string, std::string> versions;
-    versions["OpenBLAS"] = openblas_get_config();
     versions["METIS"] = std::to_string(METIS_VER_MAJOR) + "." + std::to_string(METIS_VER_MINOR) + "." +
                         std::to_string(METIS_VER_SUBMINOR);
     versions["compiler"] = __VERSION__;

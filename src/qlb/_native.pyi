@@ -119,6 +119,8 @@ class Cholesky(InverseOperator):
 class CholmodCholesky(Cholesky):
     def __init__(self, pattern: BlockPattern, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int) -> None: ...
 
+openblas_version: str = ...
+
 cholmod_version: str = '3.0.14'
 
 class RotatedInverse(InverseOperator):

@@ -323,3 +323,28 @@ def test_sizes_of_the_factor_add_up(mesh: TetMesh) -> None:
     assert double.solve_bytes == 2 * single.solve_bytes == 16 * double.factor_nonzeros
     assert double.bytes == pytest.approx(2 * single.bytes, rel=0.01)
     assert double.bytes > 8 * double.factor_nonzeros
+
+
+def test_another_precision_can_be_taken_up(block: TetMesh, rng: np.random.Generator) -> None:
+    pattern, matrix = hessian(block)
+    mask, b = some_held(block), rng.normal(size=block.positions.shape)
+    fresh = _native.SupernodalCholesky(pattern, mask, 1, "float64")
+    changed = _native.SupernodalCholesky(pattern, mask, 1, "float32")
+    changed.factorise(matrix)
+    changed.set_precision("float64")
+    with pytest.raises(RuntimeError, match="factorise first"):
+        solve(changed, b)
+    assert fresh.factorise(matrix) == changed.factorise(matrix) == -1
+    np.testing.assert_array_equal(solve(fresh, b), solve(changed, b))
+
+
+@pytest.mark.parametrize("scale", [1e-60, 1e60])
+def test_right_hand_sides_beyond_the_range_of_float_are_solved_as_well(
+    block: TetMesh, scale: float, rng: np.random.Generator
+) -> None:
+    pattern, matrix = hessian(block)
+    b = rng.normal(size=block.positions.shape)
+    cholesky = _native.SupernodalCholesky(pattern, some_held(block), 1, "float32")
+    cholesky.factorise(matrix)
+    x = solve(cholesky, b)
+    np.testing.assert_allclose(solve(cholesky, scale * b) / scale, x, rtol=0, atol=1e-5 * np.abs(x).max())

@@ -40,7 +40,7 @@ class QLA(FactoredLbfgs):
         super().__init__(system, settings, tolerance)
         self.inverse: _native.RotatedInverse
         self.inverse = _native.RotatedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
-        self.kappa = cost_of_factor(self.factor.cholesky, len(system.mesh.tets))
+        self.kappa = cost_of_factor(self.factor.cholesky, self.settings.precision, len(system.mesh.tets))
         """Cost of assembly and factorisation, in iterations."""
         self._reference: FloatArray | None = None  # positions at which the factor was taken
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from qlb import _native
 
-# Nanoseconds on one core, calibrated once (`python -m benchmarks kernels`); only their ratios matter.
-PER_FLOP = 0.030
-PER_FACTOR_ENTRY = 0.6
-PER_SOLVE_ENTRY = 1.0
+# Nanoseconds on one core with AVX-512, fitted once to `python -m benchmarks factor step`; only their ratios matter.
+PER_FLOP = {"float32": 0.0073, "float64": 0.015}
+PER_FACTOR_ENTRY = {"float32": 3.0, "float64": 4.8}
+PER_SOLVE_ENTRY = {"float32": 0.7, "float64": 1.2}
 PER_HESSIAN_TET = 110.0
 PER_GRADIENT_TET = 25.0
+PER_ITERATION = 1e5
 
 
-def cost_of_factor(cholesky: _native.Cholesky, tets: int) -> float:
-    """Cost of one assembly and factorisation, in iterations of L-BFGS over the factor."""
+def cost_of_factor(cholesky: _native.Cholesky, precision: str, tets: int) -> float:
+    """Cost of one assembly and factorisation, in iterations of L-BFGS over the factor.
+
+    `precision` is that of the factor; "auto" counts as the float32 that it starts with.
+    """
+    kind = "float64" if precision == "float64" else "float32"
     entries = cholesky.factor_nonzeros
-    factor = PER_FLOP * cholesky.factor_flops + PER_FACTOR_ENTRY * entries + PER_HESSIAN_TET * tets
-    return factor / (PER_SOLVE_ENTRY * entries + PER_GRADIENT_TET * tets)
+    factor = PER_FLOP[kind] * cholesky.factor_flops + PER_FACTOR_ENTRY[kind] * entries + PER_HESSIAN_TET * tets
+    return factor / (PER_SOLVE_ENTRY[kind] * entries + PER_GRADIENT_TET * tets + PER_ITERATION)
