@@ -194,7 +194,7 @@ def test_doctor_is_content(qlb):
     status, out, _ = qlb("doctor")
     assert status == 0
     assert "SIMD level" in out
-    assert "CHOLMOD" in out
+    assert "METIS" in out
 
 
 def test_compare_writes_one_table_and_one_plot(qlb, tmp_path):

@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from qlb import Rotation, Simulation, SolverSettings, StableNeoHookean, State, StVenantKirchhoff, TetMesh
+from qlb import Damping, Rotation, Simulation, SolverSettings, StableNeoHookean, State, StVenantKirchhoff, TetMesh
 from qlb.solvers.adaptive import PATIENCE, QLA
 from qlb.solvers.line_search import Point
 from tests.solvers.problems import bar_system, crushed, make_solver, problem_of, swinging
@@ -233,3 +233,26 @@ def test_a_run_that_has_gone_over_to_float64_resumes_to_the_same_bits() -> None:
     for _ in rest.run(2):
         pass
     np.testing.assert_array_equal(rest.state.positions, whole.state.positions)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "saved"),
+    [
+        ({}, {"reference", "account"}),
+        ({"damping": Damping(mass=2.0), "integrator": "SDIRK2"}, {"reference", "account"}),
+        ({"damping": Damping(viscosity=20.0)}, {"reference", "account", "matrix"}),
+    ],
+    ids=["plain", "mass damping", "viscous"],
+)
+def test_a_kept_factor_resumes_to_the_same_bits(arguments: dict[str, object], saved: set[str]) -> None:
+    whole, part, rest = (with_dear_factor(bar(**arguments)) for _ in range(3))
+    for _ in whole.run(12):
+        pass
+    for _ in part.run(6):
+        pass
+    arrays = part.solver.save()
+    assert set(arrays) == saved
+    rest.restore(part.state, part.steps_done, arrays)
+    results = list(rest.run(6))
+    np.testing.assert_array_equal(rest.state.positions, whole.state.positions)
+    assert sum(result.factorizations for result in results) < 6  # it went on with the old one

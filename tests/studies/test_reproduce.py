@@ -13,10 +13,8 @@ import qlb
 from qlb.results import Run, write_figure
 from qlb.results.figure import FORMATS, draw_grid
 from qlb.scenes import load_scene
-from qlb.solvers import SOLVERS
 from qlb.studies import FIGURES, Plan, Reproduction, Update, chosen_figures, plan_figures, reproduce
 from qlb.studies import reproduce_processes as processes_module
-from qlb.studies.reproduce_figures import column_solvers
 
 reproduce_module = sys.modules["qlb.studies.reproduce"]
 TINY = ("mesh.cells=4,1,1", "steps=3")
@@ -40,7 +38,7 @@ def names(updates: list[Update], state: str) -> set[str]:
 def few_solvers():
     """Two columns, so that there is less to run."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reproduce_module, "column_solvers", lambda: ["ND", "QLB"])
+        patch.setattr(reproduce_module, "COLUMNS", ("ND", "QLB"))
         yield
 
 
@@ -55,10 +53,6 @@ def test_the_figures_are_the_supplements():
     assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3]
     scene = load_scene("bar")
     assert (scene.steps, scene.tolerance.relative, scene.tolerance.absolute) == (120, 1e-6, 0)
-
-
-def test_columns_are_the_papers_solvers_and_ours_where_it_is_there():
-    assert column_solvers() == ["ND", "QLF", "QLB", *(["QLA"] if "QLA" in SOLVERS else [])]
 
 
 def test_a_case_of_several_figures_runs_once(tmp_path):

@@ -9,11 +9,13 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
+from qlb.integrators.integrator import Stage, State
 from qlb.solvers.line_search import Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
 from qlb.solvers.settings import Projection, SolverSettings, Tolerance
 from qlb.solvers.work import cost_of_factor
 from qlb.system import StageProblem, System
+from qlb.timing import Timer
 
 MAX_RESCUES = 3
 PATIENCE = 5
@@ -38,6 +40,7 @@ class QLA(FactoredLbfgs):
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         super().__init__(system, settings, tolerance)
+        self.system = system
         self.inverse: _native.RotatedInverse
         self.inverse = _native.RotatedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
         self.kappa = cost_of_factor(self.factor.cholesky, self.settings.precision, len(system.mesh.tets))
@@ -95,17 +98,27 @@ class QLA(FactoredLbfgs):
         """What the factor was made of, and the account of its use."""
         if self._reference is None or self._kind is None:
             return {}
-        account = np.array([*self._kind, self._solves, self._spent, self._stale, self.factor.raised], dtype=np.float64)
-        return {"matrix": self.factor.matrix_values(), "reference": self._reference, "account": account}
+        factor = self.factor
+        flags = (self._stale, factor.projected, factor.raised)
+        account = np.array([*self._kind, self._solves, self._spent, *flags], dtype=np.float64)
+        saved = {"reference": self._reference, "account": account}
+        if factor.shifted or not self.system.hessian_is_of_positions:
+            saved["matrix"] = factor.matrix_values()  # many times larger; else it follows from the reference
+        return saved
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take it back, and factorise again."""
         self._reference = arrays.get("reference")
         if self._reference is None:
             return
-        c, inertial, solves, spent, stale, raised = arrays["account"]
+        c, inertial, solves, spent, stale, projected, raised = arrays["account"]
         self._kind, self._solves, self._spent, self._stale = (c, bool(inertial)), int(solves), int(spent), bool(stale)
-        self.factor.restore(arrays["matrix"], raised=bool(raised))
+        values = arrays.get("matrix")
+        if values is None:
+            stage = Stage(0.0, c, ((1.0, self._reference),), np.zeros_like(self._reference), bool(inertial))
+            then = StageProblem(self.system, stage, State(0.0, self._reference, stage.v_b), Timer())
+            values = then.hessian(self._reference, project=bool(projected)).values
+        self.factor.restore(values, projected=bool(projected), raised=bool(raised))
         self.inverse.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:

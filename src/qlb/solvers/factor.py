@@ -23,6 +23,8 @@ class Factor:
 
     def __init__(self, system: System, cholesky: CholeskyKind = "supernodal", precision: Precision = "float64") -> None:
         self.cholesky = system.analyse(cholesky, precision)
+        self.shifted = False
+        """Whether it is of a Hessian with multiples of the identity added."""
         self._precision = precision
         self.raised = False
         """Whether precision "auto" has gone over to float64."""
@@ -43,6 +45,7 @@ class Factor:
         Raises:
             HessianNotFinite: nothing helps.
         """
+        self.shifted = False
         if self._try(problem, x, projection):
             return
         scale = float(np.abs(self._matrix.values).max())
@@ -50,6 +53,7 @@ class Factor:
             self._raise_precision()
             if self._try(problem, x, projection):
                 return
+        self.shifted = True
         for shift in _shifts(scale):
             self._matrix.shift_diagonal(shift)
             if self._factorise(problem):
@@ -79,13 +83,14 @@ class Factor:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""
         return self._matrix.values.copy()
 
-    def restore(self, values: FloatArray, *, raised: bool) -> None:
+    def restore(self, values: FloatArray, *, projected: bool, raised: bool) -> None:
         """Factorise what `matrix_values` gave, in the precision of then, without counting it."""
         if raised and not self.raised:
             self._raise_precision()
         if values.shape != self._matrix.values.shape:
             raise InputError(f"blocks have shape {values.shape}, must be {self._matrix.values.shape}")
         self._matrix.values[...] = values
+        self.projected = projected
         self.cholesky.factorise(self._matrix)
 
     def solve(self, problem: StageProblem, b: FloatArray) -> FloatArray:

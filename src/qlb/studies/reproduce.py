@@ -12,7 +12,7 @@ from qlb.results import Run
 from qlb.results.figure import FigureGrid, write_figure
 from qlb.results.figure_page import write_figures_page
 from qlb.scenes import load_scene
-from qlb.studies.reproduce_figures import FIGURES, Row, SupplementFigure, column_solvers
+from qlb.studies.reproduce_figures import COLUMNS, FIGURES, Row, SupplementFigure
 from qlb.studies.reproduce_folder import RUNS, claim_folder
 from qlb.studies.reproduce_processes import Case, Update, run_cases
 
@@ -86,7 +86,7 @@ def plan_figures(figures: Sequence[SupplementFigure], overrides: Sequence[str], 
         (figure.number, row.label, solver): _case(figure, row, solver, common, directory)
         for figure in figures
         for row in figure.rows
-        for solver in column_solvers()
+        for solver in COLUMNS
     }
     return Plan(directory, figures, bases, overrides, panels)
 
@@ -177,7 +177,7 @@ def _with_others(plan: Plan) -> Plan:
 
 
 def _grid(figure: SupplementFigure, plan: Plan, runs: dict[str, Run | None]) -> FigureGrid:
-    solvers = column_solvers()
+    solvers = list(COLUMNS)
     found = {
         row.label: {s: run for s in solvers if (run := runs[plan.panels[figure.number, row.label, s].name])}
         for row in figure.rows

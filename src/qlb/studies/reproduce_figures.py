@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from qlb.errors import InputError
-from qlb.solvers import SOLVERS
 
 
 @dataclass(frozen=True)
@@ -147,6 +146,9 @@ FIGURES: dict[int, SupplementFigure] = {
 }
 """Every figure that can be redrawn, by its number in the supplement."""
 
+COLUMNS = ("ND", "QLF", "QLB", "QLA")
+"""The columns of every figure: the solvers of the paper, then ours."""
+
 IN_SUPPLEMENT = range(1, 11)
 
 
@@ -168,8 +170,3 @@ def _number(name: str) -> int:
     if number in IN_SUPPLEMENT:
         raise InputError(f"figure {number} cannot be redrawn yet, its scene does not exist; there are {known}")
     raise InputError(f"figure {name!r} is not known; there are {known}")
-
-
-def column_solvers() -> list[str]:
-    """The columns of every figure: the solvers of the paper, then QLA where this qlb has it."""
-    return [name for name in ("ND", "QLF", "QLB", "QLA") if name in SOLVERS]

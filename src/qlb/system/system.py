@@ -97,6 +97,11 @@ class System:
         return np.ascontiguousarray(np.broadcast_to(viscosity, (len(self.mesh.tets),)))
 
     @property
+    def hessian_is_of_positions(self) -> bool:
+        """Whether the Hessian of a stage follows from positions, c and damping.mass: no term but gravity has a part."""
+        return len(self.terms) == 1
+
+    @property
     def nodes(self) -> int:
         """Number of nodes n."""
         return len(self.mesh.positions)
