@@ -44,7 +44,7 @@ def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) 
     rounding = max(ROUNDING * abs(start.energy), problem.energy_rounding)
     t = 1.0
     for _ in range(MAX_HALVINGS):
-        trial = Point.at(problem, start.x + t * p)
+        trial = Point.at(problem, start.x + (p if t == 1.0 else t * p))
         if trial.is_finite:
             change = trial.energy - start.energy
             if change <= ARMIJO * t * slope:

@@ -57,7 +57,7 @@ class StageProblem:
     @cached_property
     def residual_scale(self) -> float:
         """|c^2 E_i V_i^(2/3)| over the nodes: the residual of a strain of order one (after Zhu et al. 2018)."""
-        return self.force_scale * self.system.norm(self.system.stiffness)
+        return self.force_scale * self.system.norms.stiffness
 
     @cached_property
     def residual_rounding(self) -> float:
@@ -66,11 +66,11 @@ class StageProblem:
         The stiffness of energies that were added is not known: what they make of such a change is measured.
         """
         system, extent = self.system, float(np.abs(self.start).max())
-        spring = system.norm(system.spring)
+        spring = system.norms.spring
         if self.stage.inertial:
-            damping = system.damping.stiffness * spring + system.norm(system.viscous_spring)
+            damping = system.damping.stiffness * spring + system.norms.viscous_spring
             spring += damping / self.stage.c
-        estimate = 1e-15 * extent * (self._mass_scale * system.norm(system.mass) + self.force_scale * spring)
+        estimate = 1e-15 * extent * (self._mass_scale * system.norms.mass + self.force_scale * spring)
         return estimate + self._change_of_added(4e-16 * extent)
 
     def _change_of_added(self, size: float) -> float:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -21,6 +23,20 @@ from qlb.system.held_nodes import HeldNodes
 MassKind = Literal["lumped", "consistent"]
 CholeskyKind = Literal["supernodal", "cholmod"]
 Precision = Literal["auto", "float32", "float64"]
+
+
+@dataclass(frozen=True)
+class Norms:
+    """Euclidean norms over the nodes, of what a system has for each."""
+
+    mass: float
+    """[kg]"""
+    stiffness: float
+    """[N]"""
+    spring: float
+    """[N/m]"""
+    viscous_spring: float
+    """[N s/m]"""
 
 
 class System:
@@ -95,6 +111,12 @@ class System:
         """eta of each element [Pa s], shape (m,)."""
         viscosity = np.asarray(self.damping.viscosity, dtype=np.float64)
         return np.ascontiguousarray(np.broadcast_to(viscosity, (len(self.mesh.tets),)))
+
+    @cached_property
+    def norms(self) -> Norms:
+        """Those of `mass`, `stiffness`, `spring` and `viscous_spring`."""
+        values = (self.mass, self.stiffness, self.spring, self.viscous_spring)
+        return Norms(*(self.norm(value) for value in values))
 
     @property
     def hessian_is_of_positions(self) -> bool:
