@@ -67,13 +67,13 @@ void bind_energies(nb::module_& m) {
           [](TetGeometry& g, const Array<const double>& x) { return g.least_J(sized(x, 3 * g.nodes(), "x")); },
           nb::arg("x"), ReleaseGil())
       .def(
-          "rotations",
-          [](TetGeometry& g, const Array<const double>& x, const Array<const double>& reference,
-             const Array<double>& rotations) {
-            g.rotations(sized(x, 3 * g.nodes(), "x"), sized(reference, 3 * g.nodes(), "reference"),
-                        sized(rotations, 9 * g.nodes(), "rotations"));
+          "nodal_maps",
+          [](TetGeometry& g, const Array<const double>& x, const Array<const double>& reference, double weight,
+             const Array<double>& maps) {
+            g.nodal_maps(sized(x, 3 * g.nodes(), "x"), sized(reference, 3 * g.nodes(), "reference"), weight,
+                         sized(maps, 9 * g.nodes(), "maps"));
           },
-          nb::arg("x"), nb::arg("reference"), nb::arg("rotations").noconvert(), ReleaseGil());
+          nb::arg("x"), nb::arg("reference"), nb::arg("weight"), nb::arg("maps").noconvert(), ReleaseGil());
 
   nb::class_<ElasticEnergy>(m, "ElasticEnergy")
       .def(

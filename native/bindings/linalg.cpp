@@ -2,8 +2,8 @@
 
 #include "bindings/bindings.hpp"
 
+#include "linalg/carried_inverse.hpp"
 #include "linalg/lbfgs.hpp"
-#include "linalg/rotated_inverse.hpp"
 #include "linalg/supernodal_cholesky.hpp"
 #include "linalg/vector_ops.hpp"
 
@@ -103,20 +103,20 @@ void bind_linalg(nb::module_& m) {
   bind_cholmod(m);
 #endif
 
-  nb::class_<RotatedInverse, InverseOperator>(m, "RotatedInverse", "An inverse carried along by nodal rotations.")
+  nb::class_<CarriedInverse, InverseOperator>(m, "CarriedInverse", "An inverse carried along with the material.")
       .def(
           "__init__",
-          [](RotatedInverse* self, std::shared_ptr<InverseOperator> inner, std::shared_ptr<TetBlocks> blocks,
+          [](CarriedInverse* self, std::shared_ptr<InverseOperator> inner, std::shared_ptr<TetBlocks> blocks,
              const Array<const std::uint8_t>& fixed,
-             int threads) { new (self) RotatedInverse(std::move(inner), std::move(blocks), view(fixed), threads); },
+             int threads) { new (self) CarriedInverse(std::move(inner), std::move(blocks), view(fixed), threads); },
           nb::arg("inner"), nb::arg("blocks"), nb::arg("fixed"), nb::arg("threads"))
       .def(
-          "turn",
-          [](RotatedInverse& op, const Array<const double>& x, const Array<const double>& reference) {
-            op.turn(sized(x, op.size(), "x"), sized(reference, op.size(), "reference"));
+          "carry",
+          [](CarriedInverse& op, const Array<const double>& x, const Array<const double>& reference, double weight) {
+            op.carry(sized(x, op.size(), "x"), sized(reference, op.size(), "reference"), weight);
           },
-          nb::arg("x"), nb::arg("reference"), ReleaseGil())
-      .def("reset", &RotatedInverse::reset);
+          nb::arg("x"), nb::arg("reference"), nb::arg("weight"), ReleaseGil())
+      .def("reset", &CarriedInverse::reset);
   bind_supernodal(m);
 
   nb::class_<Lbfgs>(m, "Lbfgs", "Limited-memory BFGS around an inner inverse (Nocedal, Wright 2006, algorithm 7.4).")

@@ -23,7 +23,17 @@ double chunk_least_J(const ChunkData& chunk, const double* x, double* scratch) {
   return result;
 }
 
-// slot_sums (slots, 3, 3), overwritten: sum of volume F(x) F(reference)^T over the elements at each slot.
+// volume A B^T
+template <class V>
+Mat3<V> times_transpose(const Mat3<V>& A, const Mat3<V>& B, const V& volume) {
+  Mat3<V> C;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) C(i, j) = volume * (A(i, 0) * B(j, 0) + A(i, 1) * B(j, 1) + A(i, 2) * B(j, 2));
+  return C;
+}
+
+// slot_sums (slots, 2, 3, 3), overwritten: sums of volume F(x) G^T and volume G G^T over the elements at each slot,
+// G = F(reference).
 // `scratch` holds 2 * kStride * slots doubles.
 template <class V>
 void chunk_correlations(const ChunkData& chunk, const double* x, const double* reference, double* scratch,
@@ -31,38 +41,43 @@ void chunk_correlations(const ChunkData& chunk, const double* x, const double* r
   double* reference_scratch = scratch + kStride * chunk.slots;
   load_positions(chunk, x, scratch);
   load_positions(chunk, reference, reference_scratch);
-  set_zero(slot_sums, 9 * chunk.slots);
+  set_zero(slot_sums, 18 * chunk.slots);
   for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
     for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
       const Tets<V> tets(chunk, pack, lane);
       const Mat3<V> F = tets.deformation_gradient(scratch), G = tets.deformation_gradient(reference_scratch);
-      Mat3<V> correlation;
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          correlation(i, j) = tets.volume * (F(i, 0) * G(j, 0) + F(i, 1) * G(j, 1) + F(i, 2) * G(j, 2));
-      for (int a = 0; a < 4; ++a) {
-        std::int32_t slots[V::size];
-        for (std::size_t l = 0; l < V::size; ++l) slots[l] = static_cast<std::int32_t>(tets.vertex[a * kLanes + l]);
-        Scatter<V>::add_matrix(correlation, slots, slot_sums);
-      }
+      const Mat3<V> sums[2] = {times_transpose(F, G, tets.volume), times_transpose(G, G, tets.volume)};
+      for (int a = 0; a < 4; ++a)
+        for (int m = 0; m < 2; ++m) {
+          std::int32_t slots[V::size];
+          for (std::size_t l = 0; l < V::size; ++l)
+            slots[l] = 2 * static_cast<std::int32_t>(tets.vertex[a * kLanes + l]) + m;
+          Scatter<V>::add_matrix(sums[m], slots, slot_sums);
+        }
     }
 }
 
-// The rotation nearest to each of `count` matrices (count, 3, 3), in place.
+// T = (1 - weight) R + weight A for each pair of `sums` (count, 2, 3, 3), C and S: A = C S^-1 the affine map that takes
+// the reference to x with the least error, R the rotation nearest to C. T is written over C.
 template <class V>
-void nearest_rotations(double* matrices, std::int64_t count) {
+void nodal_maps(double* sums, std::int64_t count, double weight) {
   constexpr auto kWidth = static_cast<std::int64_t>(V::size);
-  alignas(64) double buffer[9][V::size];
+  alignas(64) double buffer[18][V::size];
   for (std::int64_t first = 0; first < count; first += kWidth) {
     const std::int64_t lanes = count - first < kWidth ? count - first : kWidth;
     for (std::int64_t l = 0; l < kWidth; ++l)
-      for (int k = 0; k < 9; ++k) buffer[k][l] = matrices[9 * (first + (l < lanes ? l : 0)) + k];
-    Mat3<V> G;
-    for (int k = 0; k < 9; ++k) G(k / 3, k % 3) = V::load_aligned(buffer[k]);
-    const Mat3<V> R = nearest_rotation(G);
-    for (int k = 0; k < 9; ++k) R(k / 3, k % 3).store_aligned(buffer[k]);
+      for (int k = 0; k < 18; ++k) buffer[k][l] = sums[18 * (first + (l < lanes ? l : 0)) + k];
+    Mat3<V> C, S;
+    for (int k = 0; k < 9; ++k) {
+      C(k / 3, k % 3) = V::load_aligned(buffer[k]);
+      S(k / 3, k % 3) = V::load_aligned(buffer[9 + k]);
+    }
+    const Mat3<V> cof = cofactor(S), A = C * cof;  // S is symmetric: S^-1 = cof S / det S
+    const V scale = V(weight) / dot(column(S, 0), column(cof, 0));
+    const Mat3<V> R = nearest_rotation(C);
+    for (int k = 0; k < 9; ++k) (V(1.0 - weight) * R(k / 3, k % 3) + scale * A(k / 3, k % 3)).store_aligned(buffer[k]);
     for (std::int64_t l = 0; l < lanes; ++l)
-      for (int k = 0; k < 9; ++k) matrices[9 * (first + l) + k] = buffer[k][l];
+      for (int k = 0; k < 9; ++k) sums[18 * (first + l) + k] = buffer[k][l];
   }
 }
 

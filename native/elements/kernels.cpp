@@ -13,7 +13,7 @@ namespace {
 template <template <class> class... M>
 const KernelSet& kernel_set(MaterialList<M...>) {
   static const MaterialKernels materials[] = {make_kernels<Vec, M>()..., MaterialKernels{}};
-  static const KernelSet set = {materials, {chunk_least_J<Vec>, chunk_correlations<Vec>, nearest_rotations<Vec>}};
+  static const KernelSet set = {materials, {chunk_least_J<Vec>, chunk_correlations<Vec>, nodal_maps<Vec>}};
   return set;
 }
 

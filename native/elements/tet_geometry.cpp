@@ -10,7 +10,8 @@ namespace qlb {
 TetGeometry::TetGeometry(std::shared_ptr<const TetBlocks> blocks, int threads)
     : blocks_(std::move(blocks)), kernels_(&geometry_kernels()), threads_(threads) {
   positions_.resize(2 * kStride * blocks_->slot_node.size());
-  slot_sums_.resize(9 * blocks_->slot_node.size());
+  slot_sums_.resize(18 * blocks_->slot_node.size());
+  sums_.resize(18 * blocks_->nodes);
 }
 
 double TetGeometry::least_J(const double* x) {
@@ -27,21 +28,24 @@ double TetGeometry::least_J(const double* x) {
   return result;
 }
 
-void TetGeometry::rotations(const double* x, const double* reference, double* rotations) {
+void TetGeometry::nodal_maps(const double* x, const double* reference, double weight, double* maps) {
   const auto chunks = static_cast<std::int64_t>(blocks_->chunks.size());
 #pragma omp parallel for schedule(dynamic) num_threads(threads_)
   for (std::int64_t k = 0; k < chunks; ++k) {
     const Chunk& chunk = blocks_->chunks[k];
     kernels_->correlations(chunk_geometry(*blocks_, chunk), x, reference,
                            positions_.data() + 2 * kStride * chunk.first_slot,
-                           slot_sums_.data() + 9 * chunk.first_slot);
+                           slot_sums_.data() + 18 * chunk.first_slot);
   }
-  std::fill(rotations, rotations + 9 * nodes(), 0.0);
-  add_slots<9>(blocks_->node_slots, slot_sums_.data(), 1.0, rotations, threads_);
+  std::fill(sums_.begin(), sums_.end(), 0.0);
+  add_slots<18>(blocks_->node_slots, slot_sums_.data(), 1.0, sums_.data(), threads_);
   constexpr std::int64_t kBatch = 1024;
 #pragma omp parallel for schedule(static) num_threads(threads_)
-  for (std::int64_t first = 0; first < nodes(); first += kBatch)
-    kernels_->nearest_rotations(rotations + 9 * first, std::min(kBatch, nodes() - first));
+  for (std::int64_t first = 0; first < nodes(); first += kBatch) {
+    const std::int64_t last = std::min(nodes(), first + kBatch);
+    kernels_->nodal_maps(sums_.data() + 18 * first, last - first, weight);
+    for (std::int64_t i = first; i < last; ++i) std::copy_n(sums_.data() + 18 * i, 9, maps + 9 * i);
+  }
 }
 
 }  // namespace qlb

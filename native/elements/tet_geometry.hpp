@@ -14,9 +14,10 @@ class TetGeometry {
 
   // The least J = det F over the elements; NaN where one is not a number.
   double least_J(const double* x);
-  // The rotation of the material at each node between two configurations: R_i is the polar factor of
-  // sum_e vol_e F_e(x) F_e(reference)^T over the elements at node i. rotations (nodes, 3, 3), row by row.
-  void rotations(const double* x, const double* reference, double* rotations);
+  // How the material at each node has moved between two configurations: (1 - weight) R_i + weight A_i, A_i the matrix
+  // with the least sum_e vol_e |A_i F_e(reference) - F_e(x)|^2 over the elements at node i, R_i the rotation nearest to
+  // sum_e vol_e F_e(x) F_e(reference)^T. maps (nodes, 3, 3), row by row.
+  void nodal_maps(const double* x, const double* reference, double weight, double* maps);
 
   std::int64_t nodes() const { return blocks_->nodes; }
 
@@ -25,7 +26,8 @@ class TetGeometry {
   const GeometryKernels* kernels_;
   int threads_;
   Aligned<double> positions_;  // (2, slots, kStride)
-  Aligned<double> slot_sums_;  // (slots, 3, 3)
+  Aligned<double> slot_sums_;  // (slots, 2, 3, 3)
+  Aligned<double> sums_;       // (nodes, 2, 3, 3)
 };
 
 }  // namespace qlb

@@ -37,7 +37,7 @@ METHODS = {
     "QLB on demand": ("QLB", {"projection": "on-demand"}),
     "QLA": ("QLA", {}),
     "QLA, a factor a solve": ("QLA", {"keep_factor": False}),
-    "QLA, not turned": ("QLA", {"rotate_factor": False}),
+    "QLA, not turned": ("QLA", {"carry_factor": False}),
     "QLB window 1": ("QLB", {"window": 1}),
 }
 DEFAULT = Tolerance()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from qlb import Damping, Rotation, Simulation, SolverSettings, StableNeoHookean, State, StVenantKirchhoff, TetMesh
-from qlb.solvers.adaptive import PATIENCE, QLA
+from qlb.solvers.adaptive import PATIENCE, QLA, stretch_weight
 from qlb.solvers.line_search import Point
 from tests.solvers.problems import bar_system, crushed, make_solver, problem_of, swinging
 from tests.support import Array, dense, left_end, make_system, random_rotation, right_end, small_bar
@@ -49,7 +49,7 @@ def test_both_stages_of_sdirk2_use_one_factor() -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "at_least"), [({"keep_factor": False}, 1.0), ({"rotate_factor": False}, 0.0), ({}, 0.0)]
+    ("settings", "at_least"), [({"keep_factor": False}, 1.0), ({"carry_factor": False}, 0.0), ({}, 0.0)]
 )
 def test_without_the_kept_factor_there_is_one_a_solve(settings: dict[str, object], at_least: float) -> None:
     results = list(bar(solver_settings=SolverSettings(**settings)).run(20))  # type: ignore[arg-type]
@@ -57,10 +57,10 @@ def test_without_the_kept_factor_there_is_one_a_solve(settings: dict[str, object
     assert np.mean(factors) >= at_least
 
 
-def test_turning_the_factor_saves_factors_and_iterations() -> None:
+def test_carrying_the_factor_saves_factors_and_iterations() -> None:
     work = []
     for turned in (True, False):
-        simulation = bar(solver_settings=SolverSettings(rotate_factor=turned))
+        simulation = bar(solver_settings=SolverSettings(carry_factor=turned))
         simulation.move(right_end(simulation.mesh), Rotation((1.0, 0.0, 0.0), (1.0, 0.125, 0.125), rate=1.0))
         results = list(with_dear_factor(simulation).run(40))
         work.append([sum(r.iterations for r in results), sum(r.factorizations for r in results)])
@@ -68,7 +68,7 @@ def test_turning_the_factor_saves_factors_and_iterations() -> None:
     assert work[0][1] < work[1][1]
 
 
-def test_the_turned_factor_of_a_free_body_is_that_of_the_turned_body(rng: np.random.Generator) -> None:
+def test_the_carried_factor_of_a_free_body_is_that_of_the_turned_body(rng: np.random.Generator) -> None:
     # H(Q x) = Q H(x) Q^T for an objective energy and an isotropic mass.
     system = make_system(small_bar((3, 1, 1)), gravity=(0.0, 0.0, 0.0))
     x = system.mesh.positions + 0.01 * rng.normal(size=system.mesh.positions.shape)
@@ -85,21 +85,32 @@ def test_the_turned_factor_of_a_free_body_is_that_of_the_turned_body(rng: np.ran
     assert solver.factor.count == 1
 
 
-def test_nodal_rotations_and_least_volume_ratio_are_those_of_numpy(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
+def test_nodal_maps_and_least_volume_ratio_are_those_of_numpy(weight: float, rng: np.random.Generator) -> None:
     system = make_system(small_bar((3, 2, 1)))
     mesh = system.mesh
     x, reference = (mesh.positions + 0.03 * rng.normal(size=mesh.positions.shape) for _ in range(2))
-    gradients = [_deformation_gradients(mesh, y) for y in (x, reference)]
-    sums = np.zeros((len(x), 3, 3))
-    correlation = mesh.volumes()[:, None, None] * gradients[0] @ gradients[1].transpose(0, 2, 1)
+    now, then = (_deformation_gradients(mesh, y) for y in (x, reference))
+    sums = np.zeros((2, len(x), 3, 3))
     for corner in mesh.tets.T:
-        np.add.at(sums, corner, correlation)
-    U, _, Vt = np.linalg.svd(sums)
+        for total, F in zip(sums, (now, then), strict=True):
+            np.add.at(total, corner, mesh.volumes()[:, None, None] * F @ then.transpose(0, 2, 1))
+    U, _, Vt = np.linalg.svd(sums[0])
     U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
+    expected = (1 - weight) * U @ Vt + weight * sums[0] @ np.linalg.inv(sums[1])
     found = np.empty((len(x), 3, 3))
-    system.geometry.rotations(x, reference, found)
-    np.testing.assert_allclose(found, U @ Vt, atol=1e-12)
-    assert system.geometry.least_J(x) == pytest.approx(np.linalg.det(gradients[0]).min(), rel=1e-12)
+    system.geometry.nodal_maps(x, reference, weight, found)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert system.geometry.least_J(x) == pytest.approx(np.linalg.det(now).min(), rel=1e-12)
+
+
+def test_stretch_counts_where_a_material_is_close_to_incompressible() -> None:
+    def weight(poisson: float) -> float:
+        return stretch_weight(make_system(small_bar(), StableNeoHookean(poisson=poisson)).incompressibility)
+
+    assert weight(0.0) == weight(0.4) == 0.0
+    assert weight(0.49) == pytest.approx(0.41, abs=0.01)
+    assert 0.49 < weight(0.499) < 0.5
 
 
 def _deformation_gradients(mesh: TetMesh, x: Array) -> Array:
@@ -218,7 +229,7 @@ def test_precision_goes_over_to_float64_where_float32_does_not_do_and_says_so() 
     iterations = [sum(result.iterations for result in simulation.run(3)) for simulation in (auto, double)]
     assert isinstance(auto.solver, QLA)
     assert auto.solver.factor.raised
-    assert iterations[0] <= 2 * iterations[1]
+    assert iterations[0] <= 3 * iterations[1]  # 500 and more in float32 throughout
 
 
 def test_a_run_that_has_gone_over_to_float64_resumes_to_the_same_bits() -> None:

@@ -1,4 +1,4 @@
-"""QLA: L-BFGS over one Cholesky factor that is kept, turned with the material, and made anew when that pays."""
+"""QLA: L-BFGS over one Cholesky factor that is kept, carried with the material, and made anew when that pays."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ PATIENCE = 5
 
 
 class QLA(FactoredLbfgs):
-    """The factor B is the Hessian at some earlier initial guess, carried along: R B R^T with R the nodal rotations.
+    """The factor is of the Hessian B at some earlier initial guess, carried along: B^-1 becomes T B^-1 T^T.
+
+    T is block-diagonal, for each node between the rotation R and the affine map A that the material around it has been
+    through since then. R keeps shear and inertia as they are; A takes what keeps volumes to what keeps volumes, since
+    d det F = cof F : dF, and the closer to incompressible a material is, the more that matters.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
     cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
@@ -33,7 +37,7 @@ class QLA(FactoredLbfgs):
     defaults: ClassVar[dict[str, object]] = {
         "projection": "on-demand",
         "initial_guess": "predictor",
-        "max_iterations": 2000,
+        "max_iterations": 5000,
         "window": 8,
         "precision": "auto",
     }
@@ -41,10 +45,11 @@ class QLA(FactoredLbfgs):
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         super().__init__(system, settings, tolerance)
         self.system = system
-        self.inverse: _native.RotatedInverse
-        self.inverse = _native.RotatedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
+        self.inverse: _native.CarriedInverse
+        self.inverse = _native.CarriedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
         self.kappa = cost_of_factor(self.factor.cholesky, self.settings.precision, len(system.mesh.tets))
         """Cost of assembly and factorisation, in iterations."""
+        self._stretch = stretch_weight(system.incompressibility)
         self._reference: FloatArray | None = None  # positions at which the factor was taken
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
         self._solves = self._spent = 0  # solves with this factor, and their iterations
@@ -56,18 +61,18 @@ class QLA(FactoredLbfgs):
         super().begin_solve(problem, point, goal)
 
     def prepare_factor(self, problem: StageProblem, point: Point) -> None:
-        """Turn the factor to the initial guess, or make a new one there."""
+        """Carry the factor to the initial guess, or make a new one there."""
         stale = self._stale or not self.settings.keep_factor or self._kind != _kind(problem)
         if stale or self._reference is None:
             self._refactor(problem, point, self.settings.projection)
             return
         self._mark(point)
-        if self.settings.rotate_factor:
+        if self.settings.carry_factor:
             with problem.timer.section("solve"):
-                self.inverse.turn(point.x, self._reference)
+                self.inverse.carry(point.x, self._reference, self._stretch)
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
-        """-H g, H from the pairs over the turned factor, which is made anew where contraction is too slow."""
+        """-H g, H from the pairs over the carried factor, which is made anew where contraction is too slow."""
         if self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
             self._refactor(problem, point, self.settings.projection)
         return super().direction(problem, point)
@@ -145,6 +150,15 @@ class QLA(FactoredLbfgs):
             return 0.0
         rate = log(point.residual / self._marked) / done
         return log(self._goal / point.residual) / rate if rate < 0 else inf
+
+
+def stretch_weight(incompressibility: float) -> float:
+    """Weight of A in T = (1 - w) R + w A, from the mean of (lambda + 2 mu)/E: 0 up to nu = 0.43, almost 1/2 at 0.499.
+
+    At 1/2, T = R (1 + S)/2 stays well-conditioned for any A = R S, flat or large. The rule is ours, from counts of
+    iterations over nu.
+    """
+    return 0.5 * max(0.0, 1.0 - 3.0 / incompressibility)
 
 
 def _kind(problem: StageProblem) -> tuple[float, bool]:

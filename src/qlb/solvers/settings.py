@@ -40,7 +40,7 @@ class SolverSettings(Settings):
         " velocity and acceleration (default of QLA)",
     )
     max_iterations: int | None = quantity(
-        None, "Nonlinear iterations of one solve before it counts as failed: 500, in QLA 2000", ge=1
+        None, "Nonlinear iterations of one solve before it counts as failed: 500, in QLA 5000", ge=1
     )
     window: int | None = quantity(None, "Pairs that L-BFGS keeps: 5 in QLF and QLB, 8 in QLA", ge=1, le=100)
     precision: Precision | None = Field(
@@ -52,7 +52,7 @@ class SolverSettings(Settings):
         "supernodal", description="Which Cholesky: our own supernodal one, or CHOLMOD (float64 only), the reference"
     )
     keep_factor: bool = Field(True, description="Keep the factor over steps while that pays (QLA)")
-    rotate_factor: bool = Field(True, description="Carry the factor along with the rotation of the material (QLA)")
+    carry_factor: bool = Field(True, description="Carry the factor along with the motion of the material (QLA)")
     refactor_in_solve: bool = Field(True, description="Make a new factor within a solve that contracts slowly (QLA)")
 
     def completed(self, defaults: dict[str, Any]) -> CompleteSettings:

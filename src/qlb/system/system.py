@@ -54,6 +54,7 @@ class System:
         stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
         spring: (lambda + 2 mu)_i V_i^(1/3) of each node [N/m], about a tenth of its diagonal stiffness, shape (n,).
         viscous_spring: eta_i V_i^(1/3) of each node [N s/m], as `spring` for viscosity, shape (n,).
+        incompressibility: mean of (lambda + 2 mu)/E over the body.
         energy_scale: sum of (lambda + 2 mu)_e V_e over the elements [J].
     """
 
@@ -97,6 +98,7 @@ class System:
         self.spring = _node_stiffness(mesh, stiffest, 1 / 3)
         self.viscous_spring = _node_stiffness(mesh, self._viscosity(), 1 / 3)
         self.energy_scale = float(stiffest @ mesh.volumes())
+        self.incompressibility = float(stiffest / modulus @ mesh.volumes() / mesh.volumes().sum())
         self._fixed = np.flatnonzero(held.fixed.ravel())
 
     def _damping_terms(self, blocks: _native.TetBlocks) -> list[Term]:
