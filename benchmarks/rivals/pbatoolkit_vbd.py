@@ -16,7 +16,7 @@ vbd = pbatoolkit.pbat.sim.vbd
 class VbdSimulation:
     """Its integrator from the best start and with the best acceleration that it offers, as tried on 1536 tets.
 
-    Anderson's (or Broyden's) acceleration saves half of the sweeps or more; Chebyshev's and Nesterov's made it diverge.
+    Anderson's acceleration saves more than half of the sweeps, Broyden's nearly as much; Chebyshev's made it worse.
     """
 
     def __init__(self, problem: Problem, sweeps: int, window: int) -> None:
