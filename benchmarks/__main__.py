@@ -1,12 +1,17 @@
-"""`python -m benchmarks [kernels|factor|step|ablation|variations|armadillo] ...`: prints Markdown tables."""
+"""`python -m benchmarks [kernels|factor|step|ablation|variations|armadillo|rivals] ...`: prints Markdown tables."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks import armadillo, kernels, step, variations
+from benchmarks.rivals import runner
+
+NAMES = ("kernels", "factor", "step", "ablation", "variations", "armadillo", "rivals")
 
 
 def main() -> None:
@@ -15,6 +20,7 @@ def main() -> None:
     sizes = [int(size) for size in options.sizes.split(",")]
     threads = sorted({1, options.threads})
     runs = {"steps": options.steps, "threads": options.threads, "repeats": options.repeats}
+    rivals = runner.Settings(python=options.python, integrator=options.integrator, **runs)
     tables: dict[str, Callable[[], str]] = {
         "kernels": lambda: kernels.element_table(threads),
         "factor": lambda: kernels.factor_table(threads, [step.CELLS[size] for size in sizes]),
@@ -22,6 +28,7 @@ def main() -> None:
         "ablation": lambda: step.table(sizes, step.ABLATION, variant=options.variant, **runs),
         "variations": lambda: variations.table(**runs),
         "armadillo": lambda: armadillo.table(options.mesh, options.solvers.split(","), **runs),
+        "rivals": lambda: runner.table(sizes, [name for name in options.only.split(",") if name], rivals),
     }
     for name in options.which or ["kernels", "factor", "step"]:
         print(tables[name](), end="\n\n", flush=True)
@@ -29,8 +36,7 @@ def main() -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Benchmarks of qlb, as Markdown tables")
-    names = ["kernels", "factor", "step", "ablation", "variations", "armadillo"]
-    parser.add_argument("which", nargs="*", choices=names, help="default: kernels, factor, step")
+    parser.add_argument("which", nargs="*", choices=NAMES, help="default: kernels, factor, step")
     parser.add_argument("--sizes", default="1536,5184,12288", help=f"tets, out of {list(step.CELLS)}")
     parser.add_argument("--solvers", default=",".join(step.CASES), help="NAME:KEY=VALUE, ... for step")
     parser.add_argument("--variant", default="drop", choices=["drop", "twist"])
@@ -38,6 +44,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--only", default="", help="rivals: names of packages; default: all that are installed")
+    parser.add_argument("--integrator", default="BDF1", choices=["BDF1", "BDF2"], help="rivals")
+    parser.add_argument(
+        "--python",
+        default=os.environ.get("QLB_RIVALS_PYTHON", sys.executable),
+        help="rivals: the interpreter that has them; default: $QLB_RIVALS_PYTHON, else this one",
+    )
     return parser
 
 

@@ -13,6 +13,7 @@ import qlb
 from benchmarks.machine import machine_line, markdown
 from benchmarks.pardiso import Pardiso, find_mkl, upper_triangle
 from qlb import _native
+from qlb.arrays import FloatArray
 from qlb.materials import MATERIALS, Material
 from qlb.mesh import TetMesh
 
@@ -45,16 +46,23 @@ def element_table(threads: list[int], cells: tuple[int, int, int] = (82, 20, 20)
         for level, name, material in cases:
             table = material.parameter_table(count)
             energy = _native.ElasticEnergy(blocks, material.kernels, table, workers, level, material.program())
-            seconds = [
-                best_seconds(lambda e=energy: e.value(x)),
-                best_seconds(lambda e=energy: e.add_value_gradient(x, 1.0, gradient)),
-                best_seconds(lambda e=energy: e.add_hessian(x, 1.0, False, matrix)),
-                best_seconds(lambda e=energy: e.add_hessian(x, 1.0, True, matrix)),
-            ]
+            seconds = kernel_seconds(energy, x, gradient, matrix)
             rows.append([str(workers), level, name, *(f"{1e9 * s / count:.1f}" for s in seconds)])
     header = ["threads", "SIMD", "material", "energy", "energy + gradient", "Hessian", "Hessian, projected"]
     where = machine_line(max(threads))
     return f"### Element kernels, ns per tet\n\n{count} tets. {where}.\n\n{markdown(header, rows)}"
+
+
+def kernel_seconds(
+    energy: _native.ElasticEnergy, x: FloatArray, gradient: FloatArray, matrix: _native.BlockMatrix
+) -> list[float]:
+    """Of the energy, the energy with its gradient, the exact Hessian and the projected one."""
+    return [
+        best_seconds(lambda: energy.value(x)),
+        best_seconds(lambda: energy.add_value_gradient(x, 1.0, gradient)),
+        best_seconds(lambda: energy.add_hessian(x, 1.0, False, matrix)),
+        best_seconds(lambda: energy.add_hessian(x, 1.0, True, matrix)),
+    ]
 
 
 def symbolic_stable_neo_hookean(built_in: qlb.StableNeoHookean) -> qlb.SymbolicMaterial:

@@ -97,8 +97,9 @@ class System:
         self.stiffness = _node_stiffness(mesh, modulus, 2 / 3)
         self.spring = _node_stiffness(mesh, stiffest, 1 / 3)
         self.viscous_spring = _node_stiffness(mesh, self._viscosity(), 1 / 3)
-        self.energy_scale = float(stiffest @ mesh.volumes())
-        self.incompressibility = float(stiffest / modulus @ mesh.volumes() / mesh.volumes().sum())
+        volumes = mesh.volumes()
+        self.energy_scale = float(np.sum(stiffest * volumes))
+        self.incompressibility = float(np.sum(stiffest / modulus * volumes) / volumes.sum())
         self._fixed = np.flatnonzero(held.fixed.ravel())
 
     def _damping_terms(self, blocks: _native.TetBlocks) -> list[Term]:
