@@ -39,9 +39,9 @@ class Timer:
 
     def lap(self) -> dict[str, float]:
         """Seconds by part since the last lap (or the start)."""
-        now = perf_counter()
-        claimed = {part: self.seconds[part] - self._before[part] for part in PARTS if part != "other"}
+        now, seconds, before = perf_counter(), self.seconds, self._before
+        claimed = {part: seconds[part] - before[part] for part in seconds}
         claimed["other"] = max(0.0, now - self._last - sum(claimed.values()))
-        self.seconds["other"] += claimed["other"]
-        self._last, self._before = now, dict(self.seconds)
+        seconds["other"] += claimed["other"]
+        self._last, self._before = now, seconds.copy()
         return claimed

@@ -19,6 +19,7 @@ class Gravity:
 
     def __init__(self, mass: FloatArray, acceleration: Acceleration, rest: FloatArray, threads: int) -> None:
         self._mass, self._acceleration, self._rest, self._threads = mass, acceleration, rest, threads
+        self._constant = None if callable(acceleration) else DeadLoad(self.forces(0.0), rest, threads)
 
     def forces(self, time: float) -> FloatArray:
         """Forces on the nodes [N] at `time` [s], shape (n, 3)."""
@@ -27,4 +28,4 @@ class Gravity:
 
     def at(self, stage: Stage, guess: FloatArray) -> DeadLoad:
         """A dead load at the stage's time."""
-        return DeadLoad(self.forces(stage.time), self._rest, self._threads)
+        return self._constant or DeadLoad(self.forces(stage.time), self._rest, self._threads)

@@ -97,15 +97,16 @@ class Descent(ABC):
     def _descend(self, problem: StageProblem, log: _Log, reference: float) -> Reason:
         if not log.point.is_finite:
             return Reason.NOT_FINITE
-        reason = self._converged(problem, log.point, reference)
+        goals = self._goals(problem, reference)
+        reason = _converged(log.point, *goals)
         if reason is not None:
             return reason
-        self.begin_solve(problem, log.point, max(self._goals(problem, reference)))
-        reason = self._iterate(problem, log, reference)
+        self.begin_solve(problem, log.point, max(goals))
+        reason = self._iterate(problem, log, goals)
         self.end_solve()
         return reason
 
-    def _iterate(self, problem: StageProblem, log: _Log, reference: float) -> Reason:
+    def _iterate(self, problem: StageProblem, log: _Log, goals: tuple[float, float]) -> Reason:
         reason = None
         while reason is None:
             if len(log.rows) > self.settings.max_iterations:
@@ -117,7 +118,7 @@ class Descent(ABC):
             step_length, new = found
             self.accept(old, new)
             log.add(new, step_length)
-            reason = self._converged(problem, new, reference)
+            reason = _converged(new, *goals)
         return reason
 
     def _initial_point(self, problem: StageProblem) -> Point:
@@ -144,11 +145,11 @@ class Descent(ABC):
         scaled = tolerance.scaled * problem.residual_scale
         return tolerance.relative * reference, max(tolerance.absolute, scaled, problem.residual_rounding)
 
-    def _converged(self, problem: StageProblem, point: Point, reference: float) -> Reason | None:
-        relative, absolute = self._goals(problem, reference)
-        if point.residual <= relative:
-            return Reason.CONVERGED_RELATIVE
-        return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
+
+def _converged(point: Point, relative: float, absolute: float) -> Reason | None:
+    if point.residual <= relative:
+        return Reason.CONVERGED_RELATIVE
+    return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
 
 
 class _Log:
