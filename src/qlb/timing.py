@@ -8,6 +8,10 @@ PARTS = ("gradient", "hessian", "factor", "solve", "other")
 """Parts of a step: energy with gradient; Hessian assembly; factorisation; search directions; all the rest."""
 
 
+CLAIMED = PARTS[:-1]
+"""What sections claim."""
+
+
 class Section:
     """A `with` block whose seconds are added to a part, also where it raises."""
 
@@ -40,7 +44,7 @@ class Timer:
     def lap(self) -> dict[str, float]:
         """Seconds by part since the last lap (or the start)."""
         now, seconds, before = perf_counter(), self.seconds, self._before
-        claimed = {part: seconds[part] - before[part] for part in seconds}
+        claimed = {part: seconds[part] - before[part] for part in CLAIMED}
         claimed["other"] = max(0.0, now - self._last - sum(claimed.values()))
         seconds["other"] += claimed["other"]
         self._last, self._before = now, seconds.copy()
