@@ -114,12 +114,12 @@ def _follow(case: Case, process: subprocess.Popen[str], updates: Queue[Update]) 
     """Hand the case to its process, and on what that says; in a thread, until it ends."""
     assert process.stdin is not None
     assert process.stdout is not None
-    steps, last = 0, ""
+    steps, last, taken = 0, "", True
     try:
         with process.stdin as pipe:
             json.dump({"scene": case.scene, "directory": str(case.directory)}, pipe)
-    except OSError:
-        last = "it ended before it began"
+    except OSError:  # it ended before it read its case: its exit status says why
+        taken = False
     with process.stdout as lines:
         for line in map(str.strip, lines):
             word, _, number = line.partition(" ")
@@ -129,7 +129,7 @@ def _follow(case: Case, process: subprocess.Popen[str], updates: Queue[Update]) 
             elif line:
                 last = line
     status = process.wait()
-    if status == 0:
+    if status == 0 and taken:
         updates.put(Update(case, "finished", steps))
     else:
         updates.put(Update(case, "crashed", steps, last if status > 0 and last else _ending(status)))
