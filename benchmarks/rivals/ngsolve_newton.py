@@ -43,7 +43,7 @@ class NgsolveEnergy:
     def hessian(self, x: FloatArray, project: bool) -> FloatArray:
         """Its values, in the order of `pattern`; it has no projection of elements, and none is needed in this scene."""
         if project:
-            raise NotImplementedError("NGSolve does not project the matrices of elements")
+            raise RuntimeError("NGSolve does not project element matrices, and Cholesky failed on the exact one")
         self._displace(x)
         self._form.AssembleLinearization(self._u)
         values: FloatArray = self._form.mat.CSR()[0].NumPy()
