@@ -1,4 +1,4 @@
-// What a deformation is like: its least change of volume, and how far the material at each node has turned.
+// What a deformation is like: its least change of volume, and how the material at each node has moved.
 #pragma once
 
 #include "elements/element_loop.hpp"
