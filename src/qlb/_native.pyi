@@ -41,6 +41,24 @@ class BlockMatrix:
 
     def multiply(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
+class ContactSurface:
+    """The triangles that may touch, and which bodies may touch which."""
+
+    def __init__(self, rest: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], group: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)]) -> None: ...
+
+    @property
+    def faces(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 3), writable=False)]: ...
+
+    @property
+    def edges(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]: ...
+
+    @property
+    def vertices(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,), writable=False)]: ...
+
+    def node_area(self, node: int) -> float: ...
+
+    def edge_area(self, edge: int) -> float: ...
+
 class Program:
     """
     A density of the invariants as lists of operations: for psi; for psi, d1, d2, dJ; for all derivatives. A list is
