@@ -13,3 +13,7 @@ class InputError(QlbError, ValueError):
 
 class MissingExtra(QlbError, ImportError):
     """A package that an optional part of qlb needs is not installed; the message says how to get it."""
+
+
+class QlbWarning(UserWarning):
+    """Something that works and is likely not what was meant."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from time import perf_counter
 
-PARTS = ("gradient", "hessian", "factor", "solve", "other")
-"""Parts of a step: energy with gradient; Hessian assembly; factorisation; search directions; all the rest."""
+PARTS = ("gradient", "hessian", "factor", "solve", "contact", "candidates", "other")
+"""Parts of a step: energy with gradient; Hessian assembly; factorisation; search directions; energy, forces and Hessian
+of contact; candidates and step bounds; all the rest."""
 
 
 CLAIMED = PARTS[:-1]

@@ -28,6 +28,16 @@ class State:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Positions that a solve comes from, known to be free of intersections, and when everything was there."""
+
+    positions: FloatArray
+    """[m], shape (n, 3), obstacles included"""
+    time: float
+    """[s]"""
+
+
+@dataclass(frozen=True)
 class Stage:
     """One implicit stage: find x with M (x - x_b - c v_b) = c^2 f(x, (x - x_b)/c)."""
 

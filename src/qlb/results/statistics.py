@@ -21,6 +21,8 @@ _SECONDS = {
     "hessian": "Hessian assembly",
     "factor": "Cholesky factorisation",
     "solve": "search direction",
+    "contact": "energy, forces and Hessian of contact",
+    "candidates": "pairs that may touch, and step bounds",
     "other": "all the rest",
 }
 
@@ -35,13 +37,17 @@ COLUMNS: dict[str, str] = {
     "energy": "E after the iteration [kg m^2; J in quasistatics]",
     "step_length": "accepted by the line search, in units of the search direction",
     "factorizations": "Cholesky factorisations during the iteration",
-    "contacts": "active contacts",
+    "contacts": "active contacts after the iteration",
+    "minimum_distance": "smallest distance between what touches, after the iteration [m]; inf where nothing does",
+    "step_bound": "the part of the search direction that contact allowed",
+    "columns": "nodes in the low-rank part of the factor (QLA with contact)",
+    "friction_pass": "which of the solves with friction taken anew, from 1",
     **{f"seconds_{part}": f"wall clock: {what} [s]" for part, what in _SECONDS.items()},
     "reason": "why the solve ended, on its last row only",
 }
 """Columns of stats.csv, in order: name and meaning."""
 
-_WHOLE = {"step", "stage", "parts", "iteration", "factorizations", "contacts"}
+_WHOLE = {"step", "stage", "parts", "iteration", "factorizations", "contacts", "columns", "friction_pass"}
 _TYPES: dict[str, Any] = {
     name: np.int64 if name in _WHOLE else np.str_ if name == "reason" else np.float64 for name in COLUMNS
 }
@@ -68,7 +74,8 @@ def csv_rows(result: StepResult) -> str:
 def _values(row: IterationRow, solve: SolveResult) -> list[object]:
     numbers = [repr(float(value)) for value in (row.residual, solve.reference, row.energy, row.step_length)]
     seconds = [f"{row.seconds.get(part, 0.0):.6g}" for part in _SECONDS]
-    return [row.iteration, *numbers, row.factorizations, 0, *seconds]
+    contact = [row.contacts, repr(row.minimum_distance), repr(row.step_bound), row.columns, row.friction_pass]
+    return [row.iteration, *numbers, row.factorizations, *contact, *seconds]
 
 
 def read_statistics(path: Path) -> Statistics:
@@ -101,19 +108,21 @@ class StepCount:
     """of all its solves"""
     converged: bool
     factorizations: int
+    minimum_distance: float = np.inf
+    """[m], in the states that its solves ended with"""
 
     @staticmethod
     def of(result: StepResult) -> StepCount:
         """The counts of a step that was just taken."""
-        return StepCount(result.step, result.iterations, result.converged, result.factorizations)
+        distance = min((s.rows[-1].minimum_distance for s in result.solves if s.rows), default=np.inf)
+        return StepCount(result.step, result.iterations, result.converged, result.factorizations, distance)
 
 
 def count_steps(stats: Statistics, stage: int | None = None) -> list[StepCount]:
     """The counts of each step in the rows, or of one stage of each step that has it."""
     chosen = slice(None) if stage is None else stats["stage"] == stage
-    step, iteration, made, parts, reason = (
-        stats[name][chosen] for name in ("step", "iteration", "factorizations", "parts", "reason")
-    )
+    names = ("step", "iteration", "factorizations", "parts", "reason", "minimum_distance")
+    step, iteration, made, parts, reason, distance = (stats[name][chosen] for name in names)
     steps, begin = np.unique(step, return_index=True)
     counts = []
     for number, rows in zip(steps, map(slice, begin, [*begin[1:], len(step)]), strict=True):
@@ -121,19 +130,22 @@ def count_steps(stats: Statistics, stage: int | None = None) -> list[StepCount]:
         used = reason[rows][ends][-1 if parts[rows][0] > 1 else 0 :]
         converged = len(used) > 0 and all(Reason(r).converged for r in used)
         iterations = int(iteration[rows][ends].sum())
-        counts.append(StepCount(int(number), iterations, converged, int(made[rows].sum())))
+        nearest = float(distance[rows][ends].min(initial=np.inf))
+        counts.append(StepCount(int(number), iterations, converged, int(made[rows].sum()), nearest))
     return counts
 
 
 def summarise(counts: Sequence[StepCount]) -> dict[str, Any]:
     """The keys of a summary that follow from the counts; a step that failed for good counts too."""
     iterations = [count.iterations for count in counts]
+    nearest = min((count.minimum_distance for count in counts), default=np.inf)
     return {
         "converged": all(count.converged for count in counts),
         "failed_steps": [count.step for count in counts if not count.converged],
         "iterations_mean": float(np.mean(iterations)) if iterations else 0.0,
         "iterations_max": max(iterations, default=0),
         "factorizations": sum(count.factorizations for count in counts),
+        "minimum_distance": None if np.isinf(nearest) else nearest,
     }
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from qlb.arrays import FloatArray
 from qlb.solvers.factor import Factor, HessianNotFinite
+from qlb.solvers.lead_in import LeadIn
 from qlb.solvers.line_search import Point, backtrack
 from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
@@ -63,15 +65,32 @@ class Descent(ABC):
     def solve(self, problem: StageProblem) -> SolveResult:
         """Minimise the stage's E; where its terms lag something, again with that taken at the solution, till it stays.
 
-        The last pass finds the tolerance met without an iteration; all passes share `max_iterations`.
+        The last pass finds the tolerance met without an iteration, or is the last that friction is given; all passes
+        share `max_iterations`.
         """
-        result, iterations = self.minimise(problem), -1
+        result = self.minimise(problem) if problem.contact is None else self._solve_with_contact(problem)
+        iterations = -1
         while result.reason.converged and result.iterations > iterations:
             refreshed = problem.refreshed(result.positions)
             if refreshed is None:
                 break
-            iterations = result.iterations
-            result = self.minimise(refreshed, result)
+            problem, iterations = refreshed, result.iterations
+            result = self.minimise(problem, result)
+        return result
+
+    def _solve_with_contact(self, problem: StageProblem) -> SolveResult:
+        """`minimise`, from where a way that passes through nothing leads."""
+        lead = LeadIn(problem, predict=self.settings.initial_guess == "predictor")
+        result = None
+        while not lead.arrived:
+            x = lead.advance()
+            if x is None:
+                assert result is not None
+                return lead.blocked(result)
+            result = self.minimise(problem, SolveResult.start(x, result, lead.reference))
+            lead.relaxed(result.positions)
+            if not lead.arrived and not result.reason.converged:
+                return result
         return result
 
     def minimise(self, problem: StageProblem, earlier: SolveResult | None = None) -> SolveResult:
@@ -79,7 +98,7 @@ class Descent(ABC):
 
         Or from where an `earlier` solve of the same stage ended, against the same reference, adding to its rows.
         """
-        log = _Log(problem, self.factor)
+        log = _Log(problem, self)
         if earlier is None:
             log.add(self._initial_point(problem), 0.0)
             reference = log.point.residual
@@ -88,11 +107,13 @@ class Descent(ABC):
         else:
             log.rows, log.point = list(earlier.rows), Point.at(problem, earlier.positions)
             reference = earlier.reference
+            if not log.rows:
+                log.add(log.point, 0.0)
         try:
             reason = self._descend(problem, log, reference)
         except HessianNotFinite:
             reason = Reason.NOT_FINITE
-        return SolveResult(log.point.x, reason, log.point.residual, reference, log.rows)
+        return SolveResult(log.point.x, reason, log.point.residual, reference, log.rows, log.point.contact)
 
     def _descend(self, problem: StageProblem, log: _Log, reference: float) -> Reason:
         if not log.point.is_finite:
@@ -112,12 +133,12 @@ class Descent(ABC):
             if len(log.rows) > self.settings.max_iterations:
                 return Reason.MAX_ITERATIONS
             old, found = log.point, self._search(problem, log.point)
-            if found is None:
+            if isinstance(found, Reason):
                 log.add(old, 0.0)
-                return Reason.LINE_SEARCH_FAILED
-            step_length, new = found
+                return found
+            step_length, new, longest = found
             self.accept(old, new)
-            log.add(new, step_length)
+            log.add(new, step_length, longest)
             reason = _converged(new, *goals)
         return reason
 
@@ -129,15 +150,24 @@ class Descent(ABC):
                 return guess
         return Point.at(problem, problem.start)
 
-    def _search(self, problem: StageProblem, point: Point) -> tuple[float, Point] | None:
+    def _search(self, problem: StageProblem, point: Point) -> tuple[float, Point, float] | Reason:
+        """The accepted step length, the point there, and the longest step that was allowed; or why there is none."""
         while True:
             p, slope = self.direction(problem, point)
             if np.isfinite(slope) and slope < 0:
-                found = backtrack(problem, point, p, slope)
+                if problem.contact is not None and _reach(p) <= self.tolerance.step * problem.contact.model.dhat:
+                    return Reason.CONVERGED_STEP
+                longest = _longest_step(problem, point.x, p)
+                found = backtrack(problem, point, p, slope, longest)
                 if found is not None:
-                    return found
+                    return *found, longest
             if not self.recover(problem, point):
-                return None
+                return Reason.LINE_SEARCH_FAILED
+
+    @property
+    def columns(self) -> int:
+        """Nodes whose columns a low-rank part of the factor holds."""
+        return 0
 
     def _goals(self, problem: StageProblem, reference: float) -> tuple[float, float]:
         """The |g| that will do: the relative one, and the largest of the absolute ones."""
@@ -152,16 +182,40 @@ def _converged(point: Point, relative: float, absolute: float) -> Reason | None:
     return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
 
 
+def _reach(p: FloatArray) -> float:
+    """|p|_inf [m]."""
+    return float(np.abs(p).max())
+
+
+def _longest_step(problem: StageProblem, x: FloatArray, p: FloatArray) -> float:
+    """The part of p (n, 3) [m] that contact allows, which is no longer than the bodies are large; 1 without contact."""
+    if problem.contact is None:
+        return 1.0
+    clamp = min(1.0, problem.contact.model.extent / _reach(p))
+    return clamp * problem.contact.bound(x, p if clamp == 1 else clamp * p)
+
+
 class _Log:
     """The point at hand, and a row for each iteration that led there."""
 
-    def __init__(self, problem: StageProblem, factor: Factor) -> None:
+    def __init__(self, problem: StageProblem, solver: Descent) -> None:
         self.rows: list[IterationRow] = []
         self.point: Point
-        self._timer, self._factor, self._tried = problem.timer, factor, factor.count
+        self._problem, self._solver, self._tried = problem, solver, solver.factor.count
 
-    def add(self, point: Point, step_length: float) -> None:
-        made, self._tried = self._factor.count - self._tried, self._factor.count
-        row = IterationRow(len(self.rows), point.residual, point.energy, step_length, made, self._timer.lap())
+    def add(self, point: Point, step_length: float, longest: float = 1.0) -> None:
+        solver, contact = self._solver, self._problem.contact
+        made, self._tried = solver.factor.count - self._tried, solver.factor.count
+        seconds = self._problem.timer.lap()
+        row = IterationRow(len(self.rows), point.residual, point.energy, step_length, made, seconds)
+        if contact is not None and point.contact is not None:
+            row = replace(
+                row,
+                contacts=point.contact.count,
+                minimum_distance=point.contact.minimum_distance,
+                step_bound=longest,
+                columns=solver.columns,
+                friction_pass=contact.friction_pass,
+            )
         self.rows.append(row)
         self.point = point

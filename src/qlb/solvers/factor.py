@@ -8,7 +8,9 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
+from qlb.contact.stage import ContactPoint
 from qlb.errors import InputError
+from qlb.solvers.contact_matrix import ContactMatrix
 from qlb.solvers.settings import Projection
 from qlb.system import StageProblem, System
 from qlb.system.system import CholeskyKind, Precision
@@ -23,6 +25,8 @@ class Factor:
 
     def __init__(self, system: System, cholesky: CholeskyKind = "supernodal", precision: Precision = "float64") -> None:
         self.cholesky = system.analyse(cholesky, precision)
+        self._system, self._kind = system, cholesky
+        self._with_contact: ContactMatrix | None = None
         self.shifted = False
         """Whether it is of a Hessian with multiples of the identity added."""
         self._precision = precision
@@ -34,8 +38,10 @@ class Factor:
         self.projected = False
         """Whether the factor in place is of the projected Hessian."""
 
-    def update(self, problem: StageProblem, x: FloatArray, projection: Projection) -> None:
-        """Factorise the Hessian at `x`.
+    def update(
+        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None = None
+    ) -> None:
+        """Factorise the Hessian at `x`, with that of `contact` there where it is given.
 
         With projection "on-demand" the exact Hessian is tried first. Should the last matrix that `projection` allows
         still not be positive definite (to rounding, or an exact one under "never"), precision "auto" goes over to
@@ -46,26 +52,28 @@ class Factor:
             HessianNotFinite: nothing helps.
         """
         self.shifted = False
-        if self._try(problem, x, projection):
+        if self._try(problem, x, projection, contact):
             return
         scale = float(np.abs(self._matrix.values).max())
         if np.isfinite(scale) and self._precision == "auto" and not self.raised:
             self._raise_precision()
-            if self._try(problem, x, projection):
+            if self._try(problem, x, projection, contact):
                 return
         self.shifted = True
         for shift in _shifts(scale):
             self._matrix.shift_diagonal(shift)
-            if self._factorise(problem):
+            if self._factorise(problem, x, contact):
                 return
         raise HessianNotFinite("the Hessian has entries that are not finite")
 
-    def _try(self, problem: StageProblem, x: FloatArray, projection: Projection) -> bool:
+    def _try(
+        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None
+    ) -> bool:
         """The Hessians at `x` that `projection` allows, one after the other."""
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
             problem.hessian(x, project=project, matrix=self._matrix)
             self.projected = project
-            if self._factorise(problem):
+            if self._factorise(problem, x, contact):
                 return True
         return False
 
@@ -74,10 +82,21 @@ class Factor:
         self.cholesky.set_precision("float64")
         self.raised = True
 
-    def _factorise(self, problem: StageProblem) -> bool:
+    def _factorise(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | None) -> bool:
+        matrix = self._matrix
+        if contact is not None:
+            matrix = self._add_contact(problem, x, contact)
         with problem.timer.section("factor"):
             self.count += 1
-            return self.cholesky.factorise(self._matrix) < 0
+            return self.cholesky.factorise(matrix) < 0
+
+    def _add_contact(self, problem: StageProblem, x: FloatArray, contact: ContactPoint) -> _native.BlockMatrix:
+        with problem.timer.section("contact"):
+            if self._with_contact is None:
+                self._with_contact = ContactMatrix(self._system, self._kind, self.cholesky)
+            matrix = self._with_contact.assemble(self._matrix, contact, x)
+            self.cholesky = self._with_contact.cholesky
+            return matrix
 
     def matrix_values(self) -> FloatArray:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from qlb.arrays import FloatArray
+from qlb.contact.stage import ContactPoint
 from qlb.system import StageProblem
 
 ARMIJO = 1e-4
@@ -21,6 +22,9 @@ class Point:
     energy: float
     gradient: FloatArray
     residual: float
+    smooth: FloatArray
+    """the gradient without contact"""
+    contact: ContactPoint | None = None
 
     @property
     def is_finite(self) -> bool:
@@ -30,19 +34,22 @@ class Point:
     @staticmethod
     def at(problem: StageProblem, x: FloatArray) -> Point:
         """Evaluate `problem` at `x`."""
-        energy, gradient = problem.value_gradient(x)
-        return Point(x, energy, gradient, problem.residual(gradient))
+        found = problem.evaluate(x)
+        residual = problem.residual(found.gradient)
+        return Point(x, found.energy, found.gradient, residual, found.smooth, found.contact)
 
 
-def backtrack(problem: StageProblem, start: Point, p: FloatArray, slope: float) -> tuple[float, Point] | None:
-    """The first of t = 1, 1/2, 1/4, ... that decreases E enough along `p`; None where none does.
+def backtrack(
+    problem: StageProblem, start: Point, p: FloatArray, slope: float, longest: float = 1.0
+) -> tuple[float, Point] | None:
+    """The first of t = `longest`, half of it, ... that decreases E enough along `p`; None where none does.
 
     Enough is Armijo's condition E(x + t p) <= E(x) + 1e-4 t g.p. Where the change of E is below 1e-11 |E|, or below
     what rounding leaves of the element energies, a point is taken if |g| does not grow. A trial that is not finite
     counts as too far.
     """
     rounding = max(ROUNDING * abs(start.energy), problem.energy_rounding)
-    t = 1.0
+    t = longest
     for _ in range(MAX_HALVINGS):
         trial = Point.at(problem, start.x + (p if t == 1.0 else t * p))
         if trial.is_finite:

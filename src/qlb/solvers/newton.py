@@ -23,7 +23,7 @@ class ND(Descent):
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H^-1 g."""
-        self.factor.update(problem, point.x, self._forced or self.settings.projection)
+        self.factor.update(problem, point.x, self._forced or self.settings.projection, point.contact)
         p = -self.factor.solve(problem, point.gradient)
         return p, problem.system.dot(point.gradient, p)
 

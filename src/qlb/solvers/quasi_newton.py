@@ -21,13 +21,14 @@ class FactoredLbfgs(Descent):
     The pairs are dropped before each solve. Which B, a subclass says.
     """
 
-    inverse: _native.InverseOperator
-    """B^-1"""
-
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         super().__init__(system, settings, tolerance)
         self.history = _native.Lbfgs(3 * system.nodes, self.settings.window, system.threads)
-        self.inverse = self.factor.cholesky
+
+    @property
+    def inverse(self) -> _native.InverseOperator:
+        """B^-1"""
+        return self.factor.cholesky
 
     @abstractmethod
     def prepare_factor(self, problem: StageProblem, point: Point) -> None:
@@ -74,7 +75,8 @@ class QLF(FactoredLbfgs):
             self._start = problem.start
         if problem.stage.c != self._c:
             self._c = None  # should the update fail, no factor is in place
-            self.factor.update(problem, self._start, self.settings.projection)
+            contact = None if problem.contact is None else problem.contact.at(self._start)
+            self.factor.update(problem, self._start, self.settings.projection, contact)
             self._c = problem.stage.c
 
     def save(self) -> dict[str, FloatArray]:
@@ -101,7 +103,8 @@ class QLB(FactoredLbfgs):
         self._c = None
 
     def prepare_factor(self, problem: StageProblem, point: Point) -> None:
-        """Factorise at x_k, once a step."""
+        """Factorise at x_k, once a step; with contact where the first stage begins, which is next to it."""
         if problem.stage.c != self._c:
-            self.factor.update(problem, problem.start, self.settings.projection)
+            start = problem.start if point.contact is None else point.x
+            self.factor.update(problem, start, self.settings.projection, point.contact)
             self._c = problem.stage.c

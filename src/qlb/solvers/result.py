@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from math import inf
 
 from qlb.arrays import FloatArray
+from qlb.contact.stage import ContactPoint
 
 
 class Reason(str, Enum):
@@ -13,14 +15,16 @@ class Reason(str, Enum):
 
     CONVERGED_ABSOLUTE = "converged_absolute"
     CONVERGED_RELATIVE = "converged_relative"
+    CONVERGED_STEP = "converged_step"
     MAX_ITERATIONS = "max_iterations"
     LINE_SEARCH_FAILED = "line_search_failed"
     NOT_FINITE = "not_finite"
+    MOTION_BLOCKED = "motion_blocked"
 
     @property
     def converged(self) -> bool:
         """Whether the tolerance was met."""
-        return self in (Reason.CONVERGED_ABSOLUTE, Reason.CONVERGED_RELATIVE)
+        return self in (Reason.CONVERGED_ABSOLUTE, Reason.CONVERGED_RELATIVE, Reason.CONVERGED_STEP)
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,16 @@ class IterationRow:
     """during the iteration"""
     seconds: dict[str, float]
     """wall-clock by part (`qlb.timing.PARTS`)"""
+    contacts: int = 0
+    """active after the iteration"""
+    minimum_distance: float = inf
+    """between surfaces that touch, after the iteration [m]"""
+    step_bound: float = 1.0
+    """the part of the search direction that contact allowed"""
+    columns: int = 0
+    """nodes whose columns the low-rank part of the factor holds (QLA)"""
+    friction_pass: int = 1
+    """which of the passes with friction taken anew"""
 
 
 @dataclass(frozen=True)
@@ -52,6 +66,16 @@ class SolveResult:
     reference: float
     """|g(x_k)|, what the relative tolerance refers to"""
     rows: list[IterationRow] = field(default_factory=list)
+    contact: ContactPoint | None = None
+    """contact at `positions`"""
+    detail: str = ""
+    """more about a failure, in words"""
+
+    @staticmethod
+    def start(x: FloatArray, earlier: SolveResult | None, reference: float) -> SolveResult:
+        """Where a solve is to begin: at `x` (n, 3) [m], its rows to be added to those of an `earlier` one."""
+        rows = [] if earlier is None else earlier.rows
+        return SolveResult(x, Reason.MAX_ITERATIONS, inf, reference, rows)
 
     @property
     def iterations(self) -> int:

@@ -24,6 +24,12 @@ class Tolerance(Settings):
         " 2018); the default only catches states at rest, where nothing but rounding is left",
         ge=0,
     )
+    step: float = quantity(
+        1e-2,
+        "With contact: |p|_inf of the search direction relative to contact.dhat; 0 turns it off, so that only |g|"
+        " counts",
+        ge=0,
+    )
 
 
 class SolverSettings(Settings):

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.integrators.integrator import Stage, State
+from qlb.contact.stage import ContactPoint, StageContact
+from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """E and its gradient at a point."""
+
+    energy: float
+    """[kg m^2; J in quasistatics]"""
+    gradient: FloatArray
+    """[kg m; N in quasistatics], shape (n, 3), zero at held degrees of freedom"""
+    smooth: FloatArray
+    """the gradient without contact"""
+    contact: ContactPoint | None
 
 
 class StageProblem:
@@ -23,9 +38,15 @@ class StageProblem:
     """
 
     def __init__(
-        self, system: System, stage: Stage, state: State, timer: Timer, guess: FloatArray | None = None
+        self,
+        system: System,
+        stage: Stage,
+        state: State,
+        timer: Timer,
+        guess: FloatArray | None = None,
+        origin: Origin | None = None,
     ) -> None:
-        """`guess` (n, 3) [m]: where terms take what they lag; the predictor by default."""
+        """`guess` (n, 3) [m]: where terms take what they lag; the predictor by default. `origin`: `state` by default."""
         self.system = system
         self.stage = stage
         self.timer = timer
@@ -34,20 +55,31 @@ class StageProblem:
         """x_k [m] with the held nodes where they are at the stage's time, shape (n, 3)."""
         self._mass_scale = 1.0 + stage.c * system.damping.mass if stage.inertial else 0.0
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
-        guess = self.predictor if guess is None else guess
-        at_stage = {term: potential for term in system.terms if (potential := term.at(stage, guess)) is not None}
+        self._guess = self.predictor if guess is None else guess
+        at_stage = {term: potential for term in system.terms if (potential := term.at(stage, self._guess)) is not None}
         self._potentials = [*system.potentials, *at_stage.values()]
         self._added = [at_stage[term] for term in system.added if term in at_stage]
+        self.origin = origin or Origin(state.positions, state.time)
+        self.contact: StageContact | None = None
+        """Contact in this stage, where the system has any."""
+        if system.contact is not None:
+            self.contact = StageContact(system.contact, stage, self.force_scale, self.origin, timer)
 
     def refreshed(self, x: FloatArray) -> StageProblem | None:
-        """The problem with what its terms lag taken at `x` (n, 3) [m]; None where that is of no need.
+        """The problem with what it lags taken at `x` (n, 3) [m]; None where that is of no need.
 
         With inertia the predictor is near enough for the order of the integrator; statics has no time step that would
-        make what is lagged small.
+        make what is lagged small. Friction is taken anew as often as its settings say.
         """
-        if self.stage.inertial or not any(term.lagged for term in self.system.terms):
+        lagged = not self.stage.inertial and any(term.lagged for term in self.system.terms)
+        slides = self.contact is not None and self.contact.may_lag_friction
+        if not lagged and not slides:
             return None
-        return StageProblem(self.system, self.stage, self._state, self.timer, x)
+        guess = x if lagged else self._guess
+        problem = StageProblem(self.system, self.stage, self._state, self.timer, guess, self.origin)
+        if self.contact is not None and problem.contact is not None:
+            problem.contact.follow(self.contact, x)
+        return problem
 
     @property
     def force_scale(self) -> float:
@@ -92,8 +124,20 @@ class StageProblem:
         """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e (lambda + 2 mu)_e V_e."""
         return 1e-15 * self.force_scale * self.system.energy_scale
 
+    def evaluate(self, x: FloatArray) -> Evaluation:
+        """E and its gradient at positions `x` (n, 3) [m], contact included."""
+        energy, smooth = self.value_gradient(x)
+        if self.contact is None:
+            return Evaluation(energy, smooth, smooth, None)
+        contact = self.contact.at(x)
+        gradient = self.system.clear_held(smooth + contact.gradient)
+        return Evaluation(energy + contact.energy, gradient, smooth, contact)
+
     def value_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """E and its gradient at positions `x` [m]: kg m^2 and kg m (J and N in quasistatics), gradient (n, 3)."""
+        """E without contact and its gradient at positions `x` [m].
+
+        In kg m^2 and kg m (J and N in quasistatics); the gradient has shape (n, 3), zero at held degrees of freedom.
+        """
         system, gradient, energy = self.system, np.zeros_like(x), 0.0
         with self.timer.section("gradient"):
             for potential in self._potentials:
@@ -105,7 +149,7 @@ class StageProblem:
     def hessian(
         self, x: FloatArray, *, project: bool, matrix: _native.BlockMatrix | None = None
     ) -> _native.BlockMatrix:
-        """H = (1 + c alpha) M + c^2 d2Psi/dx2 at `x`, each element's part projected to PSD where asked.
+        """H = (1 + c alpha) M + c^2 d2Psi/dx2 at `x` without contact, each element's part projected to PSD where asked.
 
         Written to `matrix`, or to a new one.
         """

@@ -148,16 +148,35 @@ class System:
         """Euclidean norm, the same bits for any number of threads."""
         return float(np.sqrt(self.dot(a, a)))
 
-    def analyse(self, kind: CholeskyKind = "supernodal", precision: Precision = "float64") -> _native.Cholesky:
-        """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised."""
+    def analyse(
+        self,
+        kind: CholeskyKind = "supernodal",
+        precision: Precision = "float64",
+        *,
+        pattern: _native.BlockPattern | None = None,
+        order: IntArray | None = None,
+    ) -> _native.Cholesky:
+        """A Cholesky factorisation of the free degrees of freedom, ordered and analysed, not yet factorised.
+
+        Args:
+            kind: whose.
+            precision: of its numbers; "auto" begins with float32.
+            pattern: an extended one, instead of that of the system.
+            order: the nodes in the order of their elimination, shape (n,); METIS finds one by default.
+        """
+        pattern = pattern or self.pattern
         if kind == "supernodal":
             first = "float32" if precision == "auto" else precision
-            return _native.SupernodalCholesky(self.pattern, self.held.fixed, self.threads, first)
+            return _native.SupernodalCholesky(pattern, self.held.fixed, self.threads, first, order=order)
         if not hasattr(_native, "CholmodCholesky"):
             raise InputError("cholesky = 'cholmod' is not in this build: see 'Reference' in docs/components.md")
         if precision != "float64":
             raise InputError(f"precision = {precision!r} is not to be had from cholmod: must be 'float64'")
-        return _native.CholmodCholesky(self.pattern, self.held.fixed, self.threads)
+        return _native.CholmodCholesky(pattern, self.held.fixed, self.threads)
+
+    def extended_pattern(self, stencils: IntArray) -> _native.BlockPattern:
+        """The pattern of the Hessian with blocks for all pairs of each of `stencils` (k, 4) in addition."""
+        return _native.BlockPattern(self.nodes, np.concatenate([self._cliques, stencils]))
 
 
 def _cliques(mesh: TetMesh, energies: Sequence[Energy]) -> IntArray:

@@ -1,0 +1,5 @@
+"""Contact: what keeps surfaces apart, and friction between them."""
+
+from qlb.contact.settings import Contact, ContactPair
+
+__all__ = ["Contact", "ContactPair"]

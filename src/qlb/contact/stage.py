@@ -1,0 +1,161 @@
+"""Contact in one stage: energy and forces at a point, and how far a step may go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import FloatArray
+from qlb.contact.model import ContactModel
+from qlb.integrators.integrator import Origin, Stage
+from qlb.timing import Timer
+
+PLANE_SHARE = 0.9  # of the way to a plane that a step may go
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """Contact and friction at a point, multiplied by c^2 as everything in a stage."""
+
+    energy: float
+    gradient: FloatArray
+    """shape (n, 3), held nodes included: minus the forces, times c^2"""
+    contacts: _native.ContactSet
+    terms: _native.RankOneTerms = field(repr=False)
+    """sum of k a a^T: the part of the Hessian along the normals, and all of friction"""
+
+    @property
+    def count(self) -> int:
+        """Active contacts."""
+        return self.contacts.size
+
+    @property
+    def minimum_distance(self) -> float:
+        """[m]; infinite where nothing touches."""
+        return self.contacts.minimum_distance
+
+
+class StageContact:
+    """The contact energy of a stage, with friction lagged at an earlier point."""
+
+    def __init__(self, model: ContactModel, stage: Stage, scale: float, origin: Origin, timer: Timer) -> None:
+        """`scale`: c^2, or 1 in quasistatics; `origin`: where the solve comes from, friction is first taken there."""
+        self.model, self._stage, self._scale, self._timer = model, stage, scale, timer
+        self._from, self._to = model.offsets(origin.time), model.offsets(stage.time)
+        self._offsets = self._from
+        self._friction: _native.Friction | None = None
+        self.friction_pass = 1
+        if model.has_friction:
+            self._lag_friction(origin.positions)
+        self._offsets = self._to
+
+    @property
+    def may_lag_friction(self) -> bool:
+        """Whether friction is to be taken anew after the solve."""
+        return self.model.has_friction and self.friction_pass < self.model.settings.friction_passes
+
+    def follow(self, earlier: StageContact, x: FloatArray) -> None:
+        """Go on after a solve with an `earlier` one of the same stage, which ended at `x` (n, 3) [m]."""
+        self.friction_pass = earlier.friction_pass + 1
+        if self.model.has_friction:
+            self._lag_friction(x)
+
+    @property
+    def planes_move(self) -> bool:
+        """Whether a plane is elsewhere than where the solve comes from."""
+        return not np.array_equal(self._from, self._to)
+
+    def set_fraction(self, s: float) -> None:
+        """Put the planes at the part `s` of their way to where they are in the stage."""
+        self._offsets = self._to if s == 1 else (1 - s) * self._from + s * self._to
+
+    def _lag_friction(self, x: FloatArray) -> None:
+        """Take normal forces and directions of sliding at positions `x` (n, 3) [m]."""
+        self._friction = None
+        model, contacts = self.model, self.at(x).contacts
+        mu = model.friction[contacts.groups[:, 0], contacts.groups[:, 1]]
+        slides = np.flatnonzero(mu * contacts.force > 0)
+        if len(slides):
+            groups = contacts.groups[slides, 1] - model.plane_allowed.shape[1]
+            on_plane = groups >= 0
+            slip = np.zeros((len(slides), 3))
+            slip[on_plane] = self._plane_motion()[groups[on_plane]]
+            self._friction = _native.Friction(
+                contacts.nodes[slides],
+                contacts.gamma[slides],
+                contacts.normal[slides],
+                contacts.force[slides] / self._scale,
+                mu[slides],
+                slip,
+            )
+
+    def at(self, x: FloatArray) -> ContactPoint:
+        """Contact at positions `x` (n, 3) [m]."""
+        model = self.model
+        self.cover(x, None)
+        with self._timer.section("contact"):
+            gradient = np.zeros_like(x)
+            planes = np.column_stack([model.normals, self._offsets])
+            candidates = model.candidates
+            contacts = model.barrier.evaluate(
+                x,
+                candidates.vertex_faces,
+                candidates.edge_edges,
+                planes,
+                model.plane_allowed,
+                self._scale,
+                gradient,
+            )
+            energy, terms = contacts.energy, contacts.terms()
+            if self._friction is not None:
+                epsilon = model.friction_velocity * self._stage.c
+                resistance = self._friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
+                energy += resistance.energy
+                terms = terms.joined(resistance.terms())
+        return ContactPoint(energy, gradient, contacts, terms)
+
+    def hessian_blocks(self, x: FloatArray, point: ContactPoint) -> FloatArray:
+        """The Hessian of each contact at `x`, projected to positive semidefinite, shape (k, 12, 12)."""
+        return point.contacts.hessian_blocks(x, True)
+
+    def cover(self, x: FloatArray, p: FloatArray | None) -> None:
+        """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""
+        candidates, dhat = self.model.candidates, self.model.dhat
+        p = np.zeros_like(x) if p is None else p
+        with self._timer.section("candidates"):
+            if not candidates.covers(x, p):
+                reach = float(np.abs(p).max())
+                candidates.build(x, p, dhat + 0.5 * min(reach, 10 * dhat), dhat)
+
+    def bound(self, x: FloatArray, p: FloatArray, *, moving_planes: bool = False) -> float:
+        """The largest part of a step p (n, 3) [m] from `x` that keeps all gaps open; 1 where the whole step does.
+
+        With `moving_planes`, they go to where they are in the stage at the same time.
+        """
+        if not self.model.is_barrier:
+            return 1.0
+        self.cover(x, p)
+        with self._timer.section("candidates"):
+            return min(self._plane_bound(x, p, moving_planes), self.model.candidates.step_bound(x, p))
+
+    def _plane_bound(self, x: FloatArray, p: FloatArray, moving_planes: bool) -> float:
+        model = self.model
+        gaps = model.plane_gaps(x, self._offsets)
+        if gaps.size == 0:
+            return 1.0
+        closing = -(p[model.vertices] @ model.normals.T)
+        if moving_planes:
+            closing = closing + (self._to - self._offsets)
+        reach = closing > PLANE_SHARE * gaps
+        return float((PLANE_SHARE * gaps[reach] / closing[reach]).min(initial=1.0))
+
+    def _plane_motion(self) -> FloatArray:
+        """How far the planes move over c [m], shape (q, 3)."""
+        model, stage = self.model, self._stage
+        ends = [
+            np.array([p.point_at(t) for p in model.around.planes]).reshape(-1, 3)
+            for t in (stage.time - stage.c, stage.time)
+        ]
+        return np.asarray(ends[1] - ends[0])

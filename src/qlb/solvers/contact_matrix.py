@@ -1,0 +1,88 @@
+"""The Hessian with contact in it: a pattern that grows with the pairs that touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import BoolArray, FloatArray, IntArray
+from qlb.contact.stage import ContactPoint
+from qlb.system import System
+from qlb.system.system import CholeskyKind
+
+REORDER = 0.02
+"""Part of the nodes in contact from which on the order of elimination of the bodies alone is no longer good enough."""
+
+_ROWS, _COLUMNS = np.tril_indices(4, -1)
+
+
+class ContactMatrix:
+    """Elastic Hessian plus that of contacts, and a Cholesky analysed for their common pattern.
+
+    Contacts with planes and obstacles fit into the pattern of the bodies. For others it is extended, and kept until a
+    pair appears that it lacks.
+    """
+
+    def __init__(self, system: System, kind: CholeskyKind, cholesky: _native.Cholesky) -> None:
+        """`cholesky`: analysed for the pattern of the bodies; its precision is that of all that follow."""
+        self._system, self._kind = system, kind
+        self.cholesky = cholesky
+        self._order = cholesky.node_order if isinstance(cholesky, _native.SupernodalCholesky) else None
+        self._pattern = system.pattern
+        self._keys = _keys(system.pattern)
+        self._stencils: IntArray = np.empty((0, 4), dtype=np.int32)
+        self._map = _native.PatternMap(system.pattern, system.pattern)
+        self._matrix = _native.BlockMatrix(system.pattern)
+        self._scripted = (system.held.fixed != 0).all(axis=1)
+
+    def assemble(self, elastic: _native.BlockMatrix, contact: ContactPoint, x: FloatArray) -> _native.BlockMatrix:
+        """`elastic` plus the projected Hessian of `contact` at `x` (n, 3) [m]; belongs to this object.
+
+        `cholesky` is another one afterwards where the pattern had to be extended.
+        """
+        nodes, blocks = self._onto_free(contact.contacts.nodes, contact.contacts.hessian_blocks(x, True))
+        missing = ~self._holds(nodes)
+        if missing.any():
+            self._extend(nodes)
+        self._matrix.set_from(elastic, self._map)
+        self._matrix.add_stencils(nodes, blocks)
+        if contact.friction is not None:
+            self._matrix.add_stencils(*self._onto_free(contact.friction.nodes, contact.friction.blocks()))
+        return self._matrix
+
+    def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Stencils in which nodes that are wholly scripted give way to another of the stencil, with nothing in it."""
+        scripted = self._scripted[nodes]
+        if not scripted.any():
+            return nodes, blocks
+        first_free = np.argmin(scripted, axis=1)
+        nodes = np.where(scripted, nodes[np.arange(len(nodes)), first_free][:, None], nodes)
+        keep = np.repeat(~scripted, 3, axis=1)
+        return np.ascontiguousarray(nodes), blocks * (keep[:, :, None] & keep[:, None, :])
+
+    def _holds(self, nodes: IntArray) -> BoolArray:
+        """Which of the stencils (k, 4) the pattern has all blocks of."""
+        i, j = nodes[:, _ROWS].astype(np.int64), nodes[:, _COLUMNS].astype(np.int64)
+        wanted = np.minimum(i, j) * self._system.nodes + np.maximum(i, j)
+        found = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
+        return np.asarray((self._keys[found] == wanted).all(axis=1))
+
+    def _extend(self, nodes: IntArray) -> None:
+        """Analyse anew, for the contacts of now, and those of before while they are not many more."""
+        system = self._system
+        kept = self._stencils if len(self._stencils) < 2 * len(nodes) else self._stencils[:0]
+        self._stencils = np.unique(np.concatenate([kept, nodes]), axis=0)
+        self._pattern = system.extended_pattern(self._stencils)
+        self._keys = _keys(self._pattern)
+        touching = len(np.unique(self._stencils))
+        order = self._order if touching < REORDER * system.nodes else None
+        precision = getattr(self.cholesky, "precision", "float64")
+        self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
+        self._map = _native.PatternMap(system.pattern, self._pattern)
+        self._matrix = _native.BlockMatrix(self._pattern)
+
+
+def _keys(pattern: _native.BlockPattern) -> np.ndarray:
+    """A number for each block, ascending."""
+    columns = np.repeat(np.arange(pattern.nodes, dtype=np.int64), np.diff(pattern.column_begin))
+    return columns * pattern.nodes + pattern.rows
