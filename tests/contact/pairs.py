@@ -85,3 +85,14 @@ def squared_distances(kind: int, x: Array) -> Array:
     """IPC Toolkit's squared distances of the pairs x (6 count, 3)."""
     distance = ipctk.point_triangle_distance if kind == VERTEX_FACE else ipctk.edge_edge_distance
     return np.array([distance(*pair[:4]) for pair in x.reshape(-1, 6, 3)])
+
+
+def dense_hessian(barrier: _native.Barrier, x: Array, found: _native.ContactSet, *, project: bool) -> Array:
+    """(3n, 3n), put together from the blocks."""
+    full = np.zeros((len(x), 3, len(x), 3))
+    for nodes, block in zip(found.nodes, barrier.hessian_blocks(x, found, project), strict=True):
+        blocks = block.reshape(4, 3, 4, 3)
+        for i in range(4):
+            for j in range(4):
+                full[nodes[i], :, nodes[j], :] += blocks[i, :, j, :]
+    return full.reshape(x.size, x.size)

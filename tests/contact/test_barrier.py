@@ -13,6 +13,7 @@ from tests.contact.pairs import (
     Array,
     Scene,
     closest_type,
+    dense_hessian,
     draw,
     six_nodes,
 )
@@ -54,17 +55,6 @@ def rest_threshold() -> float:
 
 def mollifier(x: Array) -> float:
     return float(ipctk.edge_edge_mollifier(*x[:4], rest_threshold()))
-
-
-def dense_hessian(barrier: _native.Barrier, x: Array, found: _native.ContactSet, *, project: bool) -> Array:
-    """(3n, 3n), put together from the blocks."""
-    full = np.zeros((len(x), 3, len(x), 3))
-    for nodes, block in zip(found.nodes, barrier.hessian_blocks(x, found, project), strict=True):
-        blocks = block.reshape(4, 3, 4, 3)
-        for i in range(4):
-            for j in range(4):
-                full[nodes[i], :, nodes[j], :] += blocks[i, :, j, :]
-    return full.reshape(x.size, x.size)
 
 
 @pytest.mark.parametrize(("kind", "name", "spread"), CASES)
