@@ -1,0 +1,17 @@
+// The Hessian of one contact's energy, 12 x 12 over its four nodes.
+#pragma once
+
+#include "contact/potentials.hpp"
+#include "contact/separation.hpp"
+
+namespace qlb {
+
+// stiffness n n^T at node 0, else zero. block: (12, 12).
+void plane_hessian(const std::array<double, 3>& normal, double stiffness, double* block);
+
+// Of m(c) f(d): m (f'' g g^T + f' d2d) + f' (dm g^T + g dm^T) + f d2m, with g = dd/dx. f: the potential in d.
+// project: to the nearest positive semidefinite matrix.
+void pair_hessian(const std::array<Vec3, 4>& x, const Separation& separation, Derivatives f, const Mollifier& mollifier,
+                  bool project, double* block);
+
+}  // namespace qlb
