@@ -11,6 +11,7 @@ NB_MODULE(_native, m) {
   m.doc() = "Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.";
   bind_assembly(m);
   bind_contact(m);
+  bind_candidates(m);
   bind_program(m);
   bind_energies(m);
   bind_linalg(m);

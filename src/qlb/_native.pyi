@@ -59,6 +59,57 @@ class ContactSurface:
 
     def edge_area(self, edge: int) -> float: ...
 
+class Candidates:
+    """
+    Pairs of primitives of a ContactSurface that may come near each other: the broad phase, kept while the surface stays in the boxes it was built for, and collision detection on it.
+    """
+
+    def __init__(self, surface: ContactSurface, threads: int) -> None: ...
+
+    def build(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], margin: float, radius: float) -> None:
+        """
+        Lists the pairs that may come within radius [m] of each other while every vertex stays within margin [m], by coordinate, of the box of its path x -> x + p, both (n, 3) [m]. Clamp p first: a long one lists all.
+        """
+
+    def covers(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> bool:
+        """Whether the lists are complete along all of x -> x + p."""
+
+    @property
+    def vertex_faces(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """Node and face of each pair, shape (k, 2), a copy."""
+
+    @property
+    def edge_edges(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """Edges of each pair, the lower number first, shape (l, 2), a copy."""
+
+    def step_bound(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> float:
+        """
+        The largest step in (0, 1] found for which every listed pair keeps at least the fraction `slack` of its distance at x all along x + step p. 0 only if a pair touches at x. True of all pairs where covers(x, p).
+        """
+
+    @property
+    def limiting(self) -> object:
+        """
+        Nodes (4,) of the pair that bounded the last step_bound, None if that was 1.
+        """
+
+    @property
+    def slack(self) -> float:
+        """Fraction of its distance that a pair keeps in a step, between 0 and 1."""
+
+    @slack.setter
+    def slack(self, arg: float, /) -> None: ...
+
+    def minimum_distance(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> float:
+        """
+        Least distance [m] of the listed pairs at x; infinite if none is listed.
+        """
+
+    def intersections(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """
+        Edge and face of each pair that cross or touch at x, shape (k, 2). Changes no list of candidates.
+        """
+
 class Program:
     """
     A density of the invariants as lists of operations: for psi; for psi, d1, d2, dJ; for all derivatives. A list is
