@@ -37,6 +37,7 @@ using ReleaseGil = nb::call_guard<nb::gil_scoped_release>;
 
 void bind_assembly(nb::module_& m);
 void bind_barrier(nb::module_& m);
+void bind_candidates(nb::module_& m);
 void bind_cholmod(nb::module_& m);  // only where CHOLMOD is built in
 void bind_contact(nb::module_& m);
 void bind_energies(nb::module_& m);

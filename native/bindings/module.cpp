@@ -12,6 +12,7 @@ NB_MODULE(_native, m) {
   bind_assembly(m);
   bind_contact(m);
   bind_barrier(m);
+  bind_candidates(m);
   bind_program(m);
   bind_energies(m);
   bind_linalg(m);

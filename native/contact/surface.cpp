@@ -11,6 +11,7 @@ ContactSurface::ContactSurface(std::span<const double> rest, std::span<const std
                                std::span<const std::int32_t> group, std::span<const std::uint8_t> allowed)
     : groups_(group.empty() ? 0 : 1 + *std::ranges::max_element(group)),
       group_(group.begin(), group.end()),
+      rest_(rest.begin(), rest.end()),
       allowed_(allowed.begin(), allowed.end()) {
   if (rest.size() != 3 * group.size()) throw std::invalid_argument("rest and group have different numbers of nodes");
   if (faces.size() % 3 != 0) throw std::invalid_argument("faces must have shape (f, 3)");

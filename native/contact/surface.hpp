@@ -19,6 +19,7 @@ class ContactSurface {
   std::int64_t nodes() const { return static_cast<std::int64_t>(group_.size()); }
   std::int32_t groups() const { return groups_; }
   std::int32_t group(std::int32_t node) const { return group_[node]; }
+  const double* rest() const { return rest_.data(); }  // (nodes, 3)
   bool allowed(std::int32_t group_a, std::int32_t group_b) const { return allowed_[group_a * groups_ + group_b]; }
 
   const std::vector<std::array<std::int32_t, 3>>& faces() const { return faces_; }
@@ -32,6 +33,7 @@ class ContactSurface {
  private:
   std::int32_t groups_;
   std::vector<std::int32_t> group_;
+  std::vector<double> rest_;
   std::vector<std::uint8_t> allowed_;
   std::vector<std::array<std::int32_t, 3>> faces_;
   std::vector<std::array<std::int32_t, 2>> edges_;

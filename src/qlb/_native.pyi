@@ -59,84 +59,56 @@ class ContactSurface:
 
     def edge_area(self, edge: int) -> float: ...
 
-class ContactSet:
+class Candidates:
     """
-    The contacts of one configuration, one entry of each array per contact.
-    """
-
-    @property
-    def energy(self) -> float:
-        """scaled; infinite where something touches"""
-
-    @property
-    def minimum_distance(self) -> float:
-        """[m]; infinite where there is no contact"""
-
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
-
-    @property
-    def gamma(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4), writable=False)]: ...
-
-    @property
-    def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
-
-    @property
-    def distance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
-
-    @property
-    def force(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
-
-    @property
-    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
-
-    @property
-    def key(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), writable=False)]: ...
-
-    @property
-    def groups(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]: ...
-
-class Barrier:
-    """
-    The potential of contact: a barrier, or a penalty where states may intersect.
+    Pairs of primitives of a ContactSurface that may come near each other: the broad phase, kept while the surface stays in the boxes it was built for, and collision detection on it.
     """
 
-    def __init__(self, surface: ContactSurface, dhat: float, stiffness: float, threads: int, kind: str = 'barrier') -> None: ...
+    def __init__(self, surface: ContactSurface, threads: int) -> None: ...
 
-    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], vertex_faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], edge_edges: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], planes: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], plane_allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], edge_sign: Annotated[NDArray[numpy.int8], dict(order='C', device='cpu', writable=False)] | None = None) -> ContactSet: ...
+    def build(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], margin: float, radius: float) -> None:
+        """
+        Lists the pairs that may come within radius [m] of each other while every vertex stays within margin [m], by coordinate, of the box of its path x -> x + p, both (n, 3) [m]. Clamp p first: a long one lists all.
+        """
 
-    def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]: ...
-
-class FrictionTerms:
-    """Friction's energy and its Hessian, two rank-one terms a contact."""
-
-    @property
-    def energy(self) -> float: ...
+    def covers(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> bool:
+        """Whether the lists are complete along all of x -> x + p."""
 
     @property
-    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
+    def vertex_faces(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """Node and face of each pair, shape (k, 2), a copy."""
 
     @property
-    def gamma(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4), writable=False)]: ...
+    def edge_edges(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """Edges of each pair, the lower number first, shape (l, 2), a copy."""
+
+    def step_bound(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> float:
+        """
+        The largest step in (0, 1] found for which every listed pair keeps at least the fraction `slack` of its distance at x all along x + step p. 0 only if a pair touches at x. True of all pairs where covers(x, p).
+        """
 
     @property
-    def axis(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
+    def limiting(self) -> object:
+        """
+        Nodes (4,) of the pair that bounded the last step_bound, None if that was 1.
+        """
 
     @property
-    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+    def slack(self) -> float:
+        """Fraction of its distance that a pair keeps in a step, between 0 and 1."""
 
-class Friction:
-    """Smooth Coulomb friction with lagged normal forces."""
+    @slack.setter
+    def slack(self, arg: float, /) -> None: ...
 
-    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], normal: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], normal_force: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], mu: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], slip: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None: ...
+    def minimum_distance(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> float:
+        """
+        Least distance [m] of the listed pairs at x; infinite if none is listed.
+        """
 
-    @property
-    def size(self) -> int: ...
-
-    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x_base: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], epsilon: float, scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> FrictionTerms: ...
+    def intersections(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
+        """
+        Edge and face of each pair that cross or touch at x, shape (k, 2). Changes no list of candidates.
+        """
 
 class Program:
     """

@@ -1,0 +1,211 @@
+#include "contact/candidates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "contact/additive_ccd.hpp"
+
+namespace qlb {
+namespace {
+
+constexpr std::int64_t kWorthThreads = 1024;  // pairs
+
+Vec3 node_vector(const double* values, std::int32_t node) {
+  return load3(values + 3 * static_cast<std::int64_t>(node));
+}
+
+// Positions relative to node 0 of the pair: what is rounded then is the size of the pair, not its place.
+std::array<Vec3, 4> load_positions(const double* x, const std::array<std::int32_t, 4>& nodes) {
+  const Vec3 origin = node_vector(x, nodes[0]);
+  return {Vec3{}, node_vector(x, nodes[1]) - origin, node_vector(x, nodes[2]) - origin,
+          node_vector(x, nodes[3]) - origin};
+}
+
+std::array<Vec3, 4> load_motion(const double* p, const std::array<std::int32_t, 4>& nodes) {
+  return {node_vector(p, nodes[0]), node_vector(p, nodes[1]), node_vector(p, nodes[2]), node_vector(p, nodes[3])};
+}
+
+// Whether two parallel planes more than `distance` apart have the boxes of the first `first` nodes on one side and
+// those of the others on the other side. They are sought normal to the line between the closest points of the
+// primitives at the centres of the boxes.
+template <int first>
+bool separated(const std::array<const Box*, 4>& boxes, double distance) {
+  std::array<Vec3, 4> centre, half;
+  for (int i = 0; i < 4; ++i) {
+    centre[i] = 0.5 * (boxes[i]->lo + boxes[i]->hi);
+    half[i] = 0.5 * (boxes[i]->hi - boxes[i]->lo);
+  }
+  const ClosestPoints closest = closest_points<first>(centre);
+  if (!(closest.distance2 > distance * distance)) return false;
+  const Vec3 n = (1.0 / std::sqrt(closest.distance2)) * closest.apart;
+  const auto reach = [&](int i) {
+    return std::abs(n.x) * half[i].x + std::abs(n.y) * half[i].y + std::abs(n.z) * half[i].z;
+  };
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (int i = 0; i < first; ++i) low = std::min(low, dot(n, centre[i]) - reach(i));
+  for (int i = first; i < 4; ++i) high = std::max(high, dot(n, centre[i]) + reach(i));
+  return low - high > distance;
+}
+
+}  // namespace
+
+Candidates::Candidates(std::shared_ptr<const ContactSurface> surface, int threads)
+    : surface_(std::move(surface)), threads_(std::max(threads, 1)), trees_(*surface_), collector_(threads_) {}
+
+void Candidates::set_slack(double slack) {
+  if (!(slack > 0.0 && slack < 1.0))
+    throw std::invalid_argument("slack is " + std::to_string(slack) + ", must be above 0 and below 1");
+  slack_ = slack;
+}
+
+void Candidates::check_finite(const double* values, const char* name) const {
+  for (const std::int32_t node : trees_.nodes) {
+    const Vec3 v = node_vector(values, node);
+    if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
+      throw std::invalid_argument(std::string(name) + " of node " + std::to_string(node) + " is not finite");
+  }
+}
+
+Candidates::Frame Candidates::mean_frame(const GroupTrees& group, const double* x, const double* p) const {
+  Frame frame;
+  for (std::int32_t slot = group.first; slot < group.last; ++slot) {
+    const Vec3 start = node_vector(x, trees_.nodes[slot]);
+    frame.start = frame.start + start;
+    frame.end = frame.end + (start + node_vector(p, trees_.nodes[slot]));
+  }
+  const double weight = 1.0 / std::max(group.last - group.first, 1);
+  return {weight * frame.start, weight * frame.end};
+}
+
+Box Candidates::path(std::int32_t slot, const Frame& frame, const double* x, const double* p) const {
+  const Vec3 start = node_vector(x, trees_.nodes[slot]);
+  Box box;
+  box.add(start - frame.start);
+  box.add(start + node_vector(p, trees_.nodes[slot]) - frame.end);
+  return box;
+}
+
+void Candidates::build(const double* x, const double* p, double margin, double radius) {
+  for (const auto& [value, name] : {std::pair(margin, "margin"), std::pair(radius, "radius")})
+    if (!(value >= 0.0 && std::isfinite(value)))
+      throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) + ", must be at least 0");
+  check_finite(x, "x");
+  check_finite(p, "p");
+  absolute_.resize(trees_.nodes.size());
+  relative_.resize(trees_.nodes.size());
+  double largest = 0.0;
+  for (const GroupTrees& group : trees_.groups) {
+    const Frame mean = mean_frame(group, x, p);
+    for (std::int32_t slot = group.first; slot < group.last; ++slot) {
+      absolute_[slot] = path(slot, Frame{}, x, p).grown(margin);
+      relative_[slot] = path(slot, mean, x, p).grown(margin);
+      for (const Vec3& v : {absolute_[slot].lo, absolute_[slot].hi})
+        largest = std::max({largest, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    }
+  }
+  vertex_faces_.clear();
+  edge_edges_.clear();
+  radius += 1e-14 * largest;  // rounding
+  find_pairs(relative_, true, radius);
+  find_pairs(absolute_, false, radius);
+  built_ = true;
+}
+
+void Candidates::find_pairs(const std::vector<Box>& boxes, bool within_groups, double radius) {
+  const auto count = static_cast<std::int32_t>(trees_.groups.size());
+  std::vector<TreePair<1, 3>> vertex_faces;
+  std::vector<TreePair<2, 2>> edge_edges;
+  for (std::int32_t g = 0; g < count; ++g) {
+    GroupTrees& group = trees_.groups[g];
+    if (within_groups ? group.meets_itself : group.meets_others) group.refit(boxes);
+  }
+  for (std::int32_t g = 0; g < count; ++g)
+    for (std::int32_t h = 0; h < count; ++h) {
+      if ((g == h) != within_groups || !surface_->allowed(g, h)) continue;
+      const GroupTrees &a = trees_.groups[g], &b = trees_.groups[h];
+      vertex_faces.push_back({&a.vertices, &b.faces});
+      if (g <= h) edge_edges.push_back({&a.edges, &b.edges});
+    }
+  search(vertex_faces, radius, collector_, vertex_faces_, [&](const auto& a, const auto& b) {
+    return !separated<1>({&boxes[a[0]], &boxes[b[0]], &boxes[b[1]], &boxes[b[2]]}, radius);
+  });
+  const std::size_t known = edge_edges_.size();
+  search(edge_edges, radius, collector_, edge_edges_, [&](const auto& a, const auto& b) {
+    return !separated<2>({&boxes[a[0]], &boxes[a[1]], &boxes[b[0]], &boxes[b[1]]}, radius);
+  });
+  for (std::size_t k = known; k < edge_edges_.size(); ++k)
+    if (edge_edges_[k][0] > edge_edges_[k][1]) std::swap(edge_edges_[k][0], edge_edges_[k][1]);
+}
+
+bool Candidates::covers(const double* x, const double* p) const {
+  const auto inside = [&](const Box& box, const Box& way) { return box.contains(way.lo) && box.contains(way.hi); };
+  const auto finite = [&](std::int32_t node) {
+    const Vec3 sum = node_vector(x, node) + node_vector(p, node);
+    return std::isfinite(sum.x + sum.y + sum.z);
+  };
+  if (!built_) return false;
+  for (const GroupTrees& group : trees_.groups) {
+    const Frame mean = group.meets_itself ? mean_frame(group, x, p) : Frame{};
+    for (std::int32_t slot = group.first; slot < group.last; ++slot) {
+      if (!finite(trees_.nodes[slot])) return false;
+      if (group.meets_others && !inside(absolute_[slot], path(slot, Frame{}, x, p))) return false;
+      if (group.meets_itself && !inside(relative_[slot], path(slot, mean, x, p))) return false;
+    }
+  }
+  return true;
+}
+
+std::array<std::int32_t, 4> Candidates::pair_nodes(std::int64_t pair) const {
+  const auto first = static_cast<std::int64_t>(vertex_faces_.size());
+  if (pair < first) {
+    const auto& [node, face] = vertex_faces_[pair];
+    const auto& [a, b, c] = surface_->faces()[face];
+    return {node, a, b, c};
+  }
+  const auto& [e, f] = edge_edges_[pair - first];
+  const auto& edges = surface_->edges();
+  return {edges[e][0], edges[e][1], edges[f][0], edges[f][1]};
+}
+
+double Candidates::step_bound(const double* x, const double* p) {
+  check_finite(x, "x");
+  check_finite(p, "p");
+  using Bound = std::pair<double, std::int64_t>;  // the step and, among equals, the first pair
+  const auto count = pairs(), faces = static_cast<std::int64_t>(vertex_faces_.size());
+  Bound least{1.0, -1};
+#pragma omp parallel num_threads(threads_) if (count > kWorthThreads)
+  {
+    // A pair is given up once it is above the least bound this thread has seen, which cannot change the minimum.
+    Bound mine{1.0, -1};
+#pragma omp for schedule(static) nowait
+    for (std::int64_t pair = 0; pair < count; ++pair) {
+      const auto nodes = pair_nodes(pair);
+      const auto start = load_positions(x, nodes), motion = load_motion(p, nodes);
+      const double step = pair < faces ? additive_ccd<1>(start, motion, slack_, mine.first)
+                                       : additive_ccd<2>(start, motion, slack_, mine.first);
+      mine = step < mine.first ? Bound{step, pair} : mine;
+    }
+#pragma omp critical(qlb_step_bound)
+    if (mine.second >= 0) least = std::min(least, mine);
+  }
+  limited_ = least.second >= 0;
+  if (limited_) limiting_ = pair_nodes(least.second);
+  return least.first;
+}
+
+double Candidates::minimum_distance(const double* x) const {
+  const auto count = pairs(), faces = static_cast<std::int64_t>(vertex_faces_.size());
+  double least = std::numeric_limits<double>::infinity();
+#pragma omp parallel for schedule(static) num_threads(threads_) reduction(min : least) if (count > kWorthThreads)
+  for (std::int64_t pair = 0; pair < count; ++pair) {
+    const auto at = load_positions(x, pair_nodes(pair));
+    least = std::min(least, (pair < faces ? closest_points<1>(at) : closest_points<2>(at)).distance2);
+  }
+  return std::sqrt(least);
+}
+
+}  // namespace qlb
