@@ -20,16 +20,18 @@ std::uint64_t spread_bits(std::uint64_t v) {  // 21 bits to every third bit
   return (v | v << 2) & 0x1249249249249249ULL;
 }
 
-// Elements along a Morton curve through their centroids.
+// Elements along a Morton curve through their centroids, in the box of their nodes: others (those of obstacles) have no
+// say in the order, and so in no sum.
 std::vector<std::int32_t> morton_order(std::span<const double> x, std::span<const std::int32_t> tets) {
   const std::size_t count = tets.size() / 4;
   std::array<double, 3> low, high;
   low.fill(std::numeric_limits<double>::infinity());
   high.fill(-std::numeric_limits<double>::infinity());
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    low[k % 3] = std::min(low[k % 3], x[k]);
-    high[k % 3] = std::max(high[k % 3], x[k]);
-  }
+  for (const std::int32_t node : tets)
+    for (int c = 0; c < 3; ++c) {
+      low[c] = std::min(low[c], x[3 * node + c]);
+      high[c] = std::max(high[c], x[3 * node + c]);
+    }
   const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-300});
   std::vector<std::uint64_t> code(count, 0);
   for (std::size_t e = 0; e < count; ++e)

@@ -12,6 +12,9 @@ TetGeometry::TetGeometry(std::shared_ptr<const TetBlocks> blocks, int threads)
   positions_.resize(2 * kStride * blocks_->slot_node.size());
   slot_sums_.resize(18 * blocks_->slot_node.size());
   sums_.resize(18 * blocks_->nodes);
+  const std::vector<std::int64_t>& begin = blocks_->node_slots.begin;
+  for (std::int64_t i = 0; i < nodes(); ++i)
+    if (begin[i] == begin[i + 1]) loose_nodes_.push_back(i);
 }
 
 double TetGeometry::least_J(const double* x) {
@@ -39,6 +42,8 @@ void TetGeometry::nodal_maps(const double* x, const double* reference, double we
   }
   std::fill(sums_.begin(), sums_.end(), 0.0);
   add_slots<18>(blocks_->node_slots, slot_sums_.data(), 1.0, sums_.data(), threads_);
+  for (const std::int64_t i : loose_nodes_)
+    for (int k = 0; k < 3; ++k) sums_[18 * i + 4 * k] = sums_[18 * i + 9 + 4 * k] = 1.0;
   constexpr std::int64_t kBatch = 1024;
 #pragma omp parallel for schedule(static) num_threads(threads_)
   for (std::int64_t first = 0; first < nodes(); first += kBatch) {

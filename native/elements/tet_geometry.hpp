@@ -16,7 +16,7 @@ class TetGeometry {
   double least_J(const double* x);
   // How the material at each node has moved between two configurations: (1 - weight) R_i + weight A_i, A_i the matrix
   // with the least sum_e vol_e |A_i F_e(reference) - F_e(x)|^2 over the elements at node i, R_i the rotation nearest to
-  // sum_e vol_e F_e(x) F_e(reference)^T. maps (nodes, 3, 3), row by row.
+  // sum_e vol_e F_e(x) F_e(reference)^T; the identity at a node without elements. maps (nodes, 3, 3), row by row.
   void nodal_maps(const double* x, const double* reference, double weight, double* maps);
 
   std::int64_t nodes() const { return blocks_->nodes; }
@@ -25,9 +25,10 @@ class TetGeometry {
   std::shared_ptr<const TetBlocks> blocks_;
   const GeometryKernels* kernels_;
   int threads_;
-  Aligned<double> positions_;  // (2, slots, kStride)
-  Aligned<double> slot_sums_;  // (slots, 2, 3, 3)
-  Aligned<double> sums_;       // (nodes, 2, 3, 3)
+  Aligned<double> positions_;              // (2, slots, kStride)
+  Aligned<double> slot_sums_;              // (slots, 2, 3, 3)
+  Aligned<double> sums_;                   // (nodes, 2, 3, 3)
+  std::vector<std::int64_t> loose_nodes_;  // those without elements
 };
 
 }  // namespace qlb

@@ -7,6 +7,7 @@ from importlib.metadata import version as _version
 # before the OpenMP runtime is loaded; a value that the user has set wins.
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
+from qlb.bodies import Body, Obstacle, Placement, Plane
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
 from qlb.errors import InputError, QlbError
 from qlb.fields import TimeExpression, TimeTable
@@ -25,12 +26,13 @@ from qlb.materials import (
 from qlb.mesh import TetMesh
 from qlb.simulation import Simulation, StepFailed, StepResult
 from qlb.solvers import Reason, SolverSettings, Tolerance
-from qlb.system import Keyframes, Rotation, Translation
+from qlb.system import Keyframes, Rotation, Translation, VertexAnimation
 
 __version__ = _version("qlb")
 
 __all__ = [
     "Arap",
+    "Body",
     "CompressibleNeoHookean",
     "Damping",
     "Energy",
@@ -41,6 +43,9 @@ __all__ = [
     "LinearElastic",
     "MooneyRivlin",
     "NodalEnergy",
+    "Obstacle",
+    "Placement",
+    "Plane",
     "PointForce",
     "Pressure",
     "QlbError",
@@ -61,5 +66,6 @@ __all__ = [
     "Tolerance",
     "Traction",
     "Translation",
+    "VertexAnimation",
     "__version__",
 ]

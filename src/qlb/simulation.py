@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from qlb.arrays import FloatArray, vectors
+from qlb.arrays import FloatArray, IntArray, vectors
+from qlb.bodies import Body, Obstacle, Plane
+from qlb.bodies.assembly import assemble
 from qlb.energies import Acceleration, Damping, Energy
 from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS, Integrator, State
@@ -35,9 +37,9 @@ class StepResult:
     time: float
     """at the end of the step [s]"""
     positions: FloatArray
-    """[m], shape (n, 3)"""
+    """[m], shape (n, 3); with obstacles (n + q, 3), those of their vertices behind those of the bodies"""
     velocities: FloatArray
-    """[m/s], shape (n, 3)"""
+    """[m/s], of the same shape"""
     solves: list[SolveResult] = field(repr=False)
     """one for each stage, or for each stage of each part of a step that was cut"""
     parts: int = 1
@@ -78,17 +80,21 @@ class StepFailed(QlbError, RuntimeError):
 
 
 class Simulation:
-    """One elastic body, integrated through time.
+    """One or several elastic bodies, integrated through time.
 
     Args:
-        mesh: the body at rest; it starts there.
-        material: a hyperelastic material.
+        bodies: the mesh of one body at rest, where it starts; or one or several `Body`, each with its own mesh,
+            material, fibres and initial velocity.
+        material: a hyperelastic material, for a mesh.
         fibres: families of fibres that are added to it.
+        obstacles: surfaces and planes that stand still or move by a script. They are given here and not added later,
+            because their vertices are nodes of the system, behind those of the bodies: arrays over nodes have their
+            final length from the start.
         integrator: "BDF1", "BDF2", "SDIRK2" or "quasistatic".
         solver: "QLA" (the fastest), or "ND", "QLF", "QLB" as in the paper.
         step: h [s], > 0.
         gravity: acceleration [m/s^2], shape (3,), or a function of time [s] that gives it.
-        velocity: initial velocity [m/s], shape (3,) or (n, 3).
+        velocity: initial velocity of a mesh [m/s], shape (3,) or (n, 3); at rest by default.
         mass: "lumped" or "consistent".
         damping: Rayleigh's two kinds and Kelvin-Voigt viscosity; none by default.
         tolerance: when a solve has converged.
@@ -104,15 +110,16 @@ class Simulation:
 
     def __init__(
         self,
-        mesh: TetMesh,
+        bodies: TetMesh | Body | Sequence[Body],
         *,
-        material: Material,
+        material: Material | None = None,
         fibres: Sequence[Fibres] = (),
+        obstacles: Iterable[Obstacle | Plane] = (),
         integrator: str = "BDF2",
         solver: str = "QLA",
         step: float = 1e-2,
         gravity: Acceleration = (0.0, -9.81, 0.0),
-        velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+        velocity: npt.ArrayLike | None = None,
         mass: MassKind = "lumped",
         damping: Damping | None = None,
         tolerance: Tolerance | None = None,
@@ -127,13 +134,12 @@ class Simulation:
         _require("mass", mass, "'lumped' or 'consistent'", mass in ("lumped", "consistent"))
         _require("on_failure", on_failure, "'stop', 'halve' or 'accept'", on_failure in ("stop", "halve", "accept"))
         _require("threads", threads, ">= 1", threads is None or (isinstance(threads, int) and threads >= 1))
-        _require("material", material, "a Material", isinstance(material, Material))
         _require("tolerance", tolerance, "a Tolerance", isinstance(tolerance, Tolerance | None))
         settings_fit = isinstance(solver_settings, SolverSettings | None)
         _require("solver_settings", solver_settings, "a SolverSettings", settings_fit)
-        self.mesh = mesh
-        self.material = material
-        self.fibres = tuple(fibres)
+        self.assembly = assemble(bodies, material, fibres, velocity, obstacles)
+        self.mesh = self.assembly.mesh
+        """All bodies at rest, n nodes; those of one body after the other."""
         self.step = float(step)
         self.gravity = gravity if callable(gravity) else tuple(vectors("gravity", gravity, (3,)))
         self.mass: MassKind = mass
@@ -144,12 +150,32 @@ class Simulation:
         self.threads = threads or available_threads()
         self.timer = Timer()
         """Wall-clock seconds by part, from the first step on."""
-        self._held = HeldNodes(len(mesh.positions))
+        self._held = HeldNodes(len(self.assembly.system_mesh.positions))
         self._energies: list[Energy] = []
         self._steps_done = 0
-        self._state = State(0.0, mesh.positions, vectors("velocity", velocity, mesh.positions.shape))
+        self._state = self._initial_state()
         self._system: System | None = None
         self._solver: Descent | None = None
+
+    def _initial_state(self) -> State:
+        """At rest; obstacles where their motions have them at time 0."""
+        whole = self.assembly
+        positions = whole.system_mesh.positions
+        for obstacle in whole.obstacles:
+            self._held.hold(whole.nodes_of(obstacle), positions, obstacle.motion)
+        if any(obstacle.motion is not None for obstacle in whole.obstacles):
+            positions = self._held.place(positions, 0.0)
+        for plane in whole.planes:
+            plane.point_at(0.0)
+        return State(0.0, positions, whole.velocities())
+
+    def nodes_of(self, body: int | str | Body | Obstacle) -> IntArray:
+        """Nodes of a body or obstacle, given itself, its name, or its number: bodies from 0, then obstacles.
+
+        Raises:
+            InputError: there is no such body or obstacle.
+        """
+        return self.assembly.nodes_of(body)
 
     def pin(self, nodes: npt.ArrayLike, axes: str = "xyz") -> None:
         """Hold nodes where they are now, in all or some directions. Raises `InputError` (see `HeldNodes.hold`)."""
@@ -171,12 +197,32 @@ class Simulation:
         """
         self._before_first_step("add energies")
         _require("energy", energy, "an Energy", isinstance(energy, Energy))
-        energy.node_sets(self.mesh)
+        energy.node_sets(self.assembly.system_mesh)
         self._energies.append(energy)
 
     def _before_first_step(self, what: str) -> None:
         if self._system is not None:
             raise InputError(f"cannot {what} after the first step")
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies, in the order of their nodes."""
+        return self.assembly.bodies
+
+    @property
+    def material(self) -> Material:
+        """The material of the one body. Raises `InputError` where there are several, which have each their own."""
+        return self._one_body().material
+
+    @property
+    def fibres(self) -> tuple[Fibres, ...]:
+        """The fibres of the one body; as `material`."""
+        return tuple(self._one_body().fibres)
+
+    def _one_body(self) -> Body:
+        if len(self.bodies) > 1:
+            raise InputError(f"there are {len(self.bodies)} bodies, each with its own material and fibres: see bodies")
+        return self.bodies[0]
 
     @property
     def integrator(self) -> Integrator:
@@ -198,9 +244,7 @@ class Simulation:
         """The mechanical system; made when first asked for."""
         if self._system is None:
             self._system = System(
-                self.mesh,
-                self.material,
-                fibres=self.fibres,
+                self.assembly,
                 gravity=self.gravity,
                 mass=self.mass,
                 damping=self.damping,
@@ -224,7 +268,7 @@ class Simulation:
         Raises:
             InputError: positions or velocities of another shape, or not finite.
         """
-        shape = self.mesh.positions.shape
+        shape = self.assembly.system_mesh.positions.shape
         for name, values in (("positions", state.positions), ("velocities", state.velocities)):
             _require(f"shape of {name}", np.shape(values), str(shape), np.shape(values) == shape)
             vectors(name, values, shape)

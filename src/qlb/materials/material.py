@@ -37,6 +37,10 @@ class Material(Settings):
         """What the kernels run, for a material whose density is not compiled."""
         return None
 
+    def program_key(self) -> object:
+        """Equal for two materials with the same `kernels` if their programs do the same."""
+        return None
+
     @abstractmethod
     def kernel_parameters(self) -> tuple[PerElement, ...]:
         """The constants that the compiled kernels take, in their order."""

@@ -87,6 +87,10 @@ class SymbolicMaterial(Material):
         """psi and its derivatives as lists of operations."""
         return _native.Program(len(self.parameters), *self._lists)
 
+    def program_key(self) -> object:
+        """The number of parameters and all bytes of the lists."""
+        return len(self.parameters), *(np.asarray(part).tobytes() for parts in self._lists for part in parts)
+
     def kernel_parameters(self) -> tuple[PerElement, ...]:
         """The parameters, in the order in which they were given."""
         return tuple(self.parameters.values())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,32 @@ class TetMesh:
         """
         positions, tets, regions = read_tets(Path(path))
         return TetMesh(positions, tets, regions=regions)
+
+    @staticmethod
+    def union(meshes: Sequence[TetMesh]) -> TetMesh:
+        """Nodes and tets of one mesh after the other; the mesh itself where there is one.
+
+        It has regions where all have them.
+        """
+        if len(meshes) == 1:
+            return meshes[0]
+        begin = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
+        tets = np.concatenate([mesh.tets.astype(np.int64) + k for mesh, k in zip(meshes, begin, strict=True)])
+        regions = [mesh.regions for mesh in meshes if mesh.regions is not None]
+        return TetMesh(
+            np.concatenate([mesh.positions for mesh in meshes]),
+            tets,
+            regions=np.concatenate(regions) if len(regions) == len(meshes) else None,
+        )
+
+    def with_loose_nodes(self, positions: FloatArray) -> TetMesh:
+        """The same tets, and behind their nodes others that belong to none: `positions` (q, 3) [m]; self for q = 0."""
+        if len(positions) == 0:
+            return self
+        mesh = copy(self)
+        mesh.positions = np.concatenate([self.positions, positions])
+        mesh.positions.setflags(write=False)
+        return mesh
 
     def nodes_where(self, condition: Callable[[FloatArray], BoolArray]) -> IntArray:
         """Indices of the nodes whose rest positions meet `condition`: (n, 3) positions [m] -> (n,) booleans."""

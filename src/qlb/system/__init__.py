@@ -1,7 +1,7 @@
 """The mechanical system: mesh, energies, mass and held nodes; and the stage problem that solvers minimise."""
 
 from qlb.system.held_nodes import HeldNodes
-from qlb.system.motions import Keyframes, Motion, Rotation, Translation
+from qlb.system.motions import Keyframes, Motion, Rotation, Translation, VertexAnimation
 from qlb.system.stage_problem import StageProblem
 from qlb.system.system import System
 
@@ -13,4 +13,5 @@ __all__ = [
     "StageProblem",
     "System",
     "Translation",
+    "VertexAnimation",
 ]

@@ -110,6 +110,54 @@ class Keyframes:
         return np.asarray(anchors + ((1 - s) * d[i] + s * d[last]) + (anchors - self.origin) @ (R - np.eye(3)).T)
 
 
+@dataclass(frozen=True, eq=False)
+class VertexAnimation:
+    """Moves each node along a path of its own, linear from key to key; nothing moves before the first and after the
+    last.
+
+    Args:
+        times: of the keys [s], increasing, shape (k,).
+        positions: of the nodes at each key [m], shape (k, q, 3).
+
+    Raises:
+        InputError: shapes that do not fit, times that do not increase, a number that is not finite.
+    """
+
+    times: npt.ArrayLike
+    positions: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        times = np.array(self.times, dtype=np.float64, ndmin=1)
+        if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all():
+            raise InputError(f"times of an animation {times.tolist()} must be finite, one or more")
+        check_increasing("times of an animation", times)
+        positions = np.array(self.positions, dtype=np.float64)
+        if positions.ndim != 3 or positions.shape[::2] != (len(times), 3):
+            allowed = f"({len(times)}, q, 3) for {len(times)} times"
+            raise InputError(f"positions of an animation have shape {positions.shape}, must be {allowed}")
+        bad = ~np.isfinite(positions).all(axis=2)
+        if bad.any():
+            k, i = np.argwhere(bad)[0]
+            raise InputError(f"vertex {i} of an animation has position {positions[k, i].tolist()} at key {k}")
+        for name, array in (("times", times), ("positions", positions)):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def vertices(self) -> int:
+        """How many nodes it moves."""
+        return int(np.shape(self.positions)[1])
+
+    def __call__(self, anchors: FloatArray, time: float) -> FloatArray:
+        """Positions [m] at `time` [s], wherever the anchors are."""
+        times, keys = np.asarray(self.times), np.asarray(self.positions)
+        i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))
+        if i + 1 == len(times) or time <= times[i]:
+            return np.array(keys[i])
+        s = (time - times[i]) / (times[i + 1] - times[i])
+        return np.asarray((1 - s) * keys[i] + s * keys[i + 1])
+
+
 def _keys(name: str, given: npt.ArrayLike | None, count: int) -> FloatArray:
     """`given` as an array (count, 3) that begins with zeros."""
     keys = np.asarray(0.0 if given is None else given, dtype=np.float64)

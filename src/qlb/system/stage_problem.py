@@ -97,7 +97,7 @@ class StageProblem:
 
         The stiffness of energies that were added is not known: what they make of such a change is measured.
         """
-        system, extent = self.system, float(np.abs(self.start).max())
+        system, extent = self.system, float(np.abs(self.start[: self.system.assembly.body_nodes]).max())
         spring = system.norms.spring
         if self.stage.inertial:
             damping = system.damping.stiffness * spring + system.norms.viscous_spring

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,13 +11,16 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray, IntArray, LongArray
+from qlb.bodies import Assembly, Obstacle, Plane
+from qlb.bodies.assembly import assemble
 from qlb.energies import Acceleration, Damping, Energy, Gravity, Potential, Term
 from qlb.energies.damping import KelvinVoigt, StiffnessDamping
 from qlb.errors import InputError
 from qlb.materials.fibres import Fibres
-from qlb.materials.material import Material, per_element
+from qlb.materials.material import Material
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.settings import on_mesh
+from qlb.system.assembled import ElasticEnergies
 from qlb.system.held_nodes import HeldNodes
 
 MassKind = Literal["lumped", "consistent"]
@@ -40,30 +43,35 @@ class Norms:
 
 
 class System:
-    """Mesh, material, mass, loads and held nodes, with the compiled energies over them.
+    """Bodies, obstacles, mass, loads and held nodes, with the compiled energies over them.
+
+    Nodes are those of the bodies (n), then those of the obstacles (q), which belong to no tet and have no mass.
 
     Attributes:
+        assembly: what it is made of, and which nodes belong to what.
+        mesh: all tets, and all n + q nodes where they are at rest.
         blocks: the tets as the compiled kernels take them.
         geometry: what a deformation is like, without any material.
-        elastic: the elastic energy of the material [J].
-        potentials: all energies that depend on positions alone [J]: that of the material, those of its fibres.
+        elastic: the elastic energy of all materials [J].
+        potentials: all energies that depend on positions alone [J]: one for each material model, those of fibres.
         terms: what has another potential in each stage: loads, damping.
         added: those of `terms` that come from energies which were added: loads on nodes and surfaces, a user's own.
         inertia: 1/2 |x - target|_M^2.
-        mass: what each node carries [kg], shape (n,): the row sums of the mass matrix.
-        stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n,).
-        spring: (lambda + 2 mu)_i V_i^(1/3) of each node [N/m], about a tenth of its diagonal stiffness, shape (n,).
-        viscous_spring: eta_i V_i^(1/3) of each node [N s/m], as `spring` for viscosity, shape (n,).
-        incompressibility: mean of (lambda + 2 mu)/E over the body.
+        mass: what each node carries [kg], shape (n + q,): the row sums of the mass matrix.
+        stiffness: E_i V_i^(2/3) of each node [N], the force scale of the scaled tolerance, shape (n + q,).
+        spring: (lambda + 2 mu)_i V_i^(1/3) of each node [N/m], about a tenth of its diagonal stiffness, shape (n + q,).
+        viscous_spring: eta_i V_i^(1/3) of each node [N s/m], as `spring` for viscosity, shape (n + q,).
+        incompressibility: mean of (lambda + 2 mu)/E over the bodies.
         energy_scale: sum of (lambda + 2 mu)_e V_e over the elements [J].
     """
 
     def __init__(
         self,
-        mesh: TetMesh,
-        material: Material,
+        bodies: Assembly | TetMesh,
+        material: Material | None = None,
         *,
         fibres: Sequence[Fibres] = (),
+        obstacles: Iterable[Obstacle | Plane] = (),
         gravity: Acceleration,
         mass: MassKind,
         damping: Damping,
@@ -71,43 +79,42 @@ class System:
         held: HeldNodes,
         threads: int,
     ) -> None:
-        self.mesh = mesh
+        """`bodies` is an assembly, or the mesh of one body of `material` with `fibres` among `obstacles`."""
+        whole = bodies if isinstance(bodies, Assembly) else assemble(bodies, material, fibres, None, obstacles)
+        self.assembly = whole
+        self.mesh = mesh = whole.system_mesh
         self.held = held
         self.damping = on_mesh(damping, "damping", mesh)
         self.threads = threads
         self.pattern = _native.BlockPattern(len(mesh.positions), _cliques(mesh, energies))
-        self.blocks = blocks = _native.TetBlocks(mesh.positions, mesh.tets, self.pattern)
-        self.geometry = _native.TetGeometry(blocks, threads)
-        material = material.on(mesh)
-        parameters = material.parameter_table(len(mesh.tets))
-        self.elastic = _native.ElasticEnergy(blocks, material.kernels, parameters, threads, program=material.program())
-        self.potentials: list[Potential] = [
-            self.elastic,
-            *(_native.ElasticEnergy(blocks, f.kernels, f.parameter_table(mesh), threads) for f in fibres),
-        ]
-        element_mass = per_element(material, material.density, len(mesh.tets)) * mesh.volumes()
+        made = ElasticEnergies(whole, self.pattern, threads)
+        self.blocks = made.blocks
+        self.geometry = _native.TetGeometry(made.blocks, threads)
+        self.elastic = made.elastic
+        self.potentials: list[Potential] = [*made.materials, *made.fibres]
+        volumes = mesh.volumes()
+        element_mass = whole.per_element(lambda m: m.density) * volumes
         row_begin, columns, values = mass_matrix(mesh, element_mass, mass)
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
-        self.mass: FloatArray = np.add.reduceat(values, row_begin[:-1])
+        self.mass: FloatArray = _row_sums(row_begin, values)
         self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
         self.added = [energy.term(mesh, self.pattern, threads) for energy in energies]
-        self.terms: list[Term] = [self.gravity, *self._damping_terms(blocks), *self.added]
-        modulus = per_element(material, material.modulus(), len(mesh.tets))
-        stiffest = per_element(material, material.wave_modulus(), len(mesh.tets))
+        self.terms: list[Term] = [self.gravity, *self._damping_terms(), *self.added]
+        modulus = whole.per_element(lambda m: m.modulus())
+        stiffest = whole.per_element(lambda m: m.wave_modulus())
         self.stiffness = _node_stiffness(mesh, modulus, 2 / 3)
         self.spring = _node_stiffness(mesh, stiffest, 1 / 3)
         self.viscous_spring = _node_stiffness(mesh, self._viscosity(), 1 / 3)
-        volumes = mesh.volumes()
         self.energy_scale = float(np.sum(stiffest * volumes))
         self.incompressibility = float(np.sum(stiffest / modulus * volumes) / volumes.sum())
         self._fixed = np.flatnonzero(held.fixed.ravel())
 
-    def _damping_terms(self, blocks: _native.TetBlocks) -> list[Term]:
+    def _damping_terms(self) -> list[Term]:
         terms: list[Term] = []
         if self.damping.stiffness > 0:
             terms.append(StiffnessDamping(self.damping.stiffness, self.potentials, self.pattern, self.threads))
         if self._viscosity().any():
-            terms.append(KelvinVoigt(blocks, self._viscosity(), self.threads))
+            terms.append(KelvinVoigt(self.blocks, self._viscosity(), self.threads))
         return terms
 
     def _viscosity(self) -> FloatArray:
@@ -128,8 +135,28 @@ class System:
 
     @property
     def nodes(self) -> int:
-        """Number of nodes n."""
+        """Number of nodes n + q."""
         return len(self.mesh.positions)
+
+    @property
+    def rest(self) -> FloatArray:
+        """Rest positions [m], shape (n + q, 3)."""
+        return self.mesh.positions
+
+    @property
+    def groups(self) -> IntArray:
+        """Which body or obstacle each node belongs to, shape (n + q,): body b is b, obstacle o is bodies + o."""
+        return self.assembly.groups
+
+    @property
+    def surface_faces(self) -> IntArray:
+        """Outward boundary triangles of the bodies, then the triangles of the obstacles, shape (f, 3)."""
+        return self.assembly.surface_faces
+
+    @property
+    def planes(self) -> tuple[Plane, ...]:
+        """The half-spaces, which have no nodes."""
+        return self.assembly.planes
 
     def clear_held(self, gradient: FloatArray) -> FloatArray:
         """Zero the entries of `gradient` (n, 3) that belong to held degrees of freedom, in place."""
@@ -213,8 +240,19 @@ def mass_matrix(mesh: TetMesh, element_mass: FloatArray, kind: MassKind) -> tupl
 
 
 def _node_stiffness(mesh: TetMesh, modulus: FloatArray, power: float) -> FloatArray:
-    """E_i V_i^power of each node, from means over its elements, shape (n,)."""
+    """E_i V_i^power of each node, from means over its elements, shape (nodes,); 0 where there are none."""
     nodes, share = mesh.tets.ravel(), np.repeat(mesh.volumes() / 4, 4)
     volume = np.bincount(nodes, weights=share, minlength=len(mesh.positions))
     stiffness = np.bincount(nodes, weights=share * np.repeat(modulus, 4), minlength=len(mesh.positions))
-    return np.asarray(stiffness * volume ** (power - 1))
+    used = volume > 0
+    result = np.zeros(len(volume))
+    result[used] = stiffness[used] * volume[used] ** (power - 1)
+    return result
+
+
+def _row_sums(row_begin: LongArray, values: FloatArray) -> FloatArray:
+    """Sums of the rows of a matrix in compressed sparse rows; empty ones have 0."""
+    used = row_begin[1:] > row_begin[:-1]
+    sums = np.zeros(len(used))
+    sums[used] = np.add.reduceat(values, row_begin[:-1][used])
+    return sums
