@@ -8,8 +8,9 @@ from importlib.metadata import version as _version
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from qlb.bodies import Body, Obstacle, Placement, Plane
+from qlb.contact import Contact, ContactPair
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
-from qlb.errors import InputError, QlbError
+from qlb.errors import InputError, QlbError, QlbWarning
 from qlb.fields import TimeExpression, TimeTable
 from qlb.integrators import State
 from qlb.materials import (
@@ -34,6 +35,8 @@ __all__ = [
     "Arap",
     "Body",
     "CompressibleNeoHookean",
+    "Contact",
+    "ContactPair",
     "Damping",
     "Energy",
     "Fibres",
@@ -49,6 +52,7 @@ __all__ = [
     "PointForce",
     "Pressure",
     "QlbError",
+    "QlbWarning",
     "Reason",
     "Rotation",
     "Simulation",

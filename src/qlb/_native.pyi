@@ -59,6 +59,85 @@ class ContactSurface:
 
     def edge_area(self, edge: int) -> float: ...
 
+class ContactSet:
+    """
+    The contacts of one configuration, one entry of each array per contact.
+    """
+
+    @property
+    def energy(self) -> float:
+        """scaled; infinite where something touches"""
+
+    @property
+    def minimum_distance(self) -> float:
+        """[m]; infinite where there is no contact"""
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def gamma(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
+
+    @property
+    def distance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
+    @property
+    def force(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
+    @property
+    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
+    @property
+    def key(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), writable=False)]: ...
+
+    @property
+    def groups(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]: ...
+
+class Barrier:
+    """
+    The potential of contact: a barrier, or a penalty where states may intersect.
+    """
+
+    def __init__(self, surface: ContactSurface, dhat: float, stiffness: float, threads: int, kind: str = 'barrier') -> None: ...
+
+    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], vertex_faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], edge_edges: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], planes: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], plane_allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], edge_sign: Annotated[NDArray[numpy.int8], dict(order='C', device='cpu', writable=False)] | None = None) -> ContactSet: ...
+
+    def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]: ...
+
+class FrictionTerms:
+    """Friction's energy and its Hessian, two rank-one terms a contact."""
+
+    @property
+    def energy(self) -> float: ...
+
+    @property
+    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def gamma(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def axis(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
+
+    @property
+    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
+class Friction:
+    """Smooth Coulomb friction with lagged normal forces."""
+
+    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], normal: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], normal_force: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], mu: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], slip: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None: ...
+
+    @property
+    def size(self) -> int: ...
+
+    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x_base: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], epsilon: float, scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> FrictionTerms: ...
+
 class Candidates:
     """
     Pairs of primitives of a ContactSurface that may come near each other: the broad phase, kept while the surface stays in the boxes it was built for, and collision detection on it.

@@ -13,9 +13,10 @@ import numpy.typing as npt
 from qlb.arrays import FloatArray, IntArray, vectors
 from qlb.bodies import Body, Obstacle, Plane
 from qlb.bodies.assembly import assemble
+from qlb.contact import Contact
 from qlb.energies import Acceleration, Damping, Energy
 from qlb.errors import InputError, QlbError
-from qlb.integrators import INTEGRATORS, Integrator, State
+from qlb.integrators import INTEGRATORS, Integrator, Origin, State
 from qlb.materials import Fibres, Material
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
@@ -97,6 +98,8 @@ class Simulation:
         velocity: initial velocity of a mesh [m/s], shape (3,) or (n, 3); at rest by default.
         mass: "lumped" or "consistent".
         damping: Rayleigh's two kinds and Kelvin-Voigt viscosity; none by default.
+        contact: how bodies touch themselves, each other and obstacles; False for not at all. By default `Contact()`
+            where there are several bodies or an obstacle, and not at all for one body alone.
         tolerance: when a solve has converged.
         solver_settings: settings of the solver.
         on_failure: what to do about a step that does not converge: "stop" raises `StepFailed`; "halve" takes it in two
@@ -122,6 +125,7 @@ class Simulation:
         velocity: npt.ArrayLike | None = None,
         mass: MassKind = "lumped",
         damping: Damping | None = None,
+        contact: Contact | Literal[False] | None = None,
         tolerance: Tolerance | None = None,
         solver_settings: SolverSettings | None = None,
         on_failure: OnFailure = "stop",
@@ -135,6 +139,7 @@ class Simulation:
         _require("on_failure", on_failure, "'stop', 'halve' or 'accept'", on_failure in ("stop", "halve", "accept"))
         _require("threads", threads, ">= 1", threads is None or (isinstance(threads, int) and threads >= 1))
         _require("tolerance", tolerance, "a Tolerance", isinstance(tolerance, Tolerance | None))
+        _require("contact", contact, "a Contact or False", contact is False or isinstance(contact, Contact | None))
         settings_fit = isinstance(solver_settings, SolverSettings | None)
         _require("solver_settings", solver_settings, "a SolverSettings", settings_fit)
         self.assembly = assemble(bodies, material, fibres, velocity, obstacles)
@@ -144,6 +149,9 @@ class Simulation:
         self.gravity = gravity if callable(gravity) else tuple(vectors("gravity", gravity, (3,)))
         self.mass: MassKind = mass
         self.damping = damping or Damping()
+        if contact is None and (len(self.assembly.bodies) > 1 or self.assembly.obstacles or self.assembly.planes):
+            contact = Contact()
+        self.contact: Contact | None = contact or None
         self.tolerance = tolerance or Tolerance()
         self.solver_settings = solver_settings or SolverSettings()
         self.on_failure: OnFailure = on_failure
@@ -250,8 +258,11 @@ class Simulation:
                 damping=self.damping,
                 energies=self._energies,
                 held=self._held,
+                contact=self.contact,
                 threads=self.threads,
             )
+            if self._system.contact is not None:
+                self._system.contact.require_free(self._state.positions, self._state.time)
         return self._system
 
     @property
@@ -301,13 +312,15 @@ class Simulation:
 
     def _take(self, integrator: Integrator, state: State, h: float) -> tuple[State, list[SolveResult]]:
         """One step of `h`; stops at the first stage that fails, unless failed steps are to be accepted."""
-        solver, solves = self.solver, []
+        solver, solves = self.solver, list[SolveResult]()
+        origin = Origin(state.positions, state.time)
         solver.begin_step()
         stages = integrator.step(state, h)
         stage = next(stages)
         while True:
-            solve = solver.solve(StageProblem(self.system, stage, state, self.timer))
+            solve = solver.solve(StageProblem(self.system, stage, state, self.timer, origin=origin))
             solves.append(solve)
+            origin = Origin(solve.positions, stage.time)
             if not solve.reason.converged and self.on_failure != "accept":
                 return State(state.time + h, solve.positions, stage.velocity(solve.positions)), solves
             try:

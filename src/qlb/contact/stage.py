@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray
+from qlb.arrays import FloatArray, IntArray
 from qlb.contact.model import ContactModel
 from qlb.integrators.integrator import Origin, Stage
 from qlb.timing import Timer
@@ -23,8 +23,19 @@ class ContactPoint:
     gradient: FloatArray
     """shape (n, 3), held nodes included: minus the forces, times c^2"""
     contacts: _native.ContactSet
-    terms: _native.RankOneTerms = field(repr=False)
-    """sum of k a a^T: the part of the Hessian along the normals, and all of friction"""
+    friction: _native.FrictionTerms | None = None
+
+    def terms(self) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+        """The Hessian along the normals, and that of friction, as a sum of k a a^T: nodes, gamma, axes, k."""
+        c, f = self.contacts, self.friction
+        if f is None:
+            return c.nodes, c.gamma, c.normal, c.stiffness
+        return (
+            np.concatenate([c.nodes, f.nodes]),
+            np.concatenate([c.gamma, f.gamma]),
+            np.concatenate([c.normal, f.axis]),
+            np.concatenate([c.stiffness, f.stiffness]),
+        )
 
     @property
     def count(self) -> int:
@@ -108,17 +119,11 @@ class StageContact:
                 self._scale,
                 gradient,
             )
-            energy, terms = contacts.energy, contacts.terms()
-            if self._friction is not None:
-                epsilon = model.friction_velocity * self._stage.c
-                resistance = self._friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
-                energy += resistance.energy
-                terms = terms.joined(resistance.terms())
-        return ContactPoint(energy, gradient, contacts, terms)
-
-    def hessian_blocks(self, x: FloatArray, point: ContactPoint) -> FloatArray:
-        """The Hessian of each contact at `x`, projected to positive semidefinite, shape (k, 12, 12)."""
-        return point.contacts.hessian_blocks(x, True)
+            if self._friction is None:
+                return ContactPoint(contacts.energy, gradient, contacts)
+            epsilon = model.friction_velocity * self._stage.c
+            friction = self._friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
+            return ContactPoint(contacts.energy + friction.energy, gradient, contacts, friction)
 
     def cover(self, x: FloatArray, p: FloatArray | None) -> None:
         """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""

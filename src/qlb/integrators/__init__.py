@@ -1,7 +1,7 @@
 """Time integrators. Each supplies the stages of a step, (c, x_b, v_b), and its start-up; nothing else."""
 
 from qlb.integrators.bdf import BDF1, BDF2
-from qlb.integrators.integrator import Integrator, Stage, State
+from qlb.integrators.integrator import Integrator, Origin, Stage, State
 from qlb.integrators.quasistatic import Quasistatic
 from qlb.integrators.sdirk2 import SDIRK2
 
@@ -13,4 +13,4 @@ INTEGRATORS: dict[str, type[Integrator]] = {
 }
 """Every integrator by the name that scene files and the command line use."""
 
-__all__ = ["BDF1", "BDF2", "INTEGRATORS", "SDIRK2", "Integrator", "Quasistatic", "Stage", "State"]
+__all__ = ["BDF1", "BDF2", "INTEGRATORS", "SDIRK2", "Integrator", "Origin", "Quasistatic", "Stage", "State"]

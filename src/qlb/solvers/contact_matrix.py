@@ -40,14 +40,17 @@ class ContactMatrix:
 
         `cholesky` is another one afterwards where the pattern had to be extended.
         """
-        nodes, blocks = self._onto_free(contact.contacts.nodes, contact.contacts.hessian_blocks(x, True))
+        model = self._system.contact
+        assert model is not None
+        blocks = model.barrier.hessian_blocks(x, contact.contacts, True)
+        nodes, blocks = self._onto_free(contact.contacts.nodes, blocks)
         missing = ~self._holds(nodes)
         if missing.any():
             self._extend(nodes)
         self._matrix.set_from(elastic, self._map)
         self._matrix.add_stencils(nodes, blocks)
         if contact.friction is not None:
-            self._matrix.add_stencils(*self._onto_free(contact.friction.nodes, contact.friction.blocks()))
+            self._matrix.add_stencils(*self._onto_free(contact.friction.nodes, _blocks(contact.friction)))
         return self._matrix
 
     def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -80,6 +83,12 @@ class ContactMatrix:
         self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
         self._map = _native.PatternMap(system.pattern, self._pattern)
         self._matrix = _native.BlockMatrix(self._pattern)
+
+
+def _blocks(terms: _native.FrictionTerms) -> FloatArray:
+    """stiffness a a^T of each term, shape (k, 12, 12)."""
+    a = (terms.gamma[:, :, None] * terms.axis[:, None, :]).reshape(-1, 12)
+    return np.asarray(terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
 
 
 def _keys(pattern: _native.BlockPattern) -> np.ndarray:

@@ -66,9 +66,7 @@ class Factor:
                 return
         raise HessianNotFinite("the Hessian has entries that are not finite")
 
-    def _try(
-        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None
-    ) -> bool:
+    def _try(self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None) -> bool:
         """The Hessians at `x` that `projection` allows, one after the other."""
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
             problem.hessian(x, project=project, matrix=self._matrix)

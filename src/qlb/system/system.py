@@ -13,6 +13,8 @@ from qlb import _native
 from qlb.arrays import FloatArray, IntArray, LongArray
 from qlb.bodies import Assembly, Obstacle, Plane
 from qlb.bodies.assembly import assemble
+from qlb.contact import Contact
+from qlb.contact.model import ContactModel, Surroundings
 from qlb.energies import Acceleration, Damping, Energy, Gravity, Potential, Term
 from qlb.energies.damping import KelvinVoigt, StiffnessDamping
 from qlb.errors import InputError
@@ -54,6 +56,7 @@ class System:
         geometry: what a deformation is like, without any material.
         elastic: the elastic energy of all materials [J].
         potentials: all energies that depend on positions alone [J]: one for each material model, those of fibres.
+        contact: what may touch, and how; None where nothing does.
         terms: what has another potential in each stage: loads, damping.
         added: those of `terms` that come from energies which were added: loads on nodes and surfaces, a user's own.
         inertia: 1/2 |x - target|_M^2.
@@ -77,6 +80,7 @@ class System:
         damping: Damping,
         energies: Sequence[Energy] = (),
         held: HeldNodes,
+        contact: Contact | None = None,
         threads: int,
     ) -> None:
         """`bodies` is an assembly, or the mesh of one body of `material` with `fibres` among `obstacles`."""
@@ -86,7 +90,8 @@ class System:
         self.held = held
         self.damping = on_mesh(damping, "damping", mesh)
         self.threads = threads
-        self.pattern = _native.BlockPattern(len(mesh.positions), _cliques(mesh, energies))
+        self._cliques = _cliques(mesh, energies)
+        self.pattern = _native.BlockPattern(len(mesh.positions), self._cliques)
         made = ElasticEnergies(whole, self.pattern, threads)
         self.blocks = made.blocks
         self.geometry = _native.TetGeometry(made.blocks, threads)
@@ -108,6 +113,9 @@ class System:
         self.energy_scale = float(np.sum(stiffest * volumes))
         self.incompressibility = float(np.sum(stiffest / modulus * volumes) / volumes.sum())
         self._fixed = np.flatnonzero(held.fixed.ravel())
+        self.contact = (
+            None if contact is None else ContactModel(contact, _surroundings(whole, float(modulus.max()), threads))
+        )
 
     def _damping_terms(self) -> list[Term]:
         terms: list[Term] = []
@@ -204,6 +212,13 @@ class System:
     def extended_pattern(self, stencils: IntArray) -> _native.BlockPattern:
         """The pattern of the Hessian with blocks for all pairs of each of `stencils` (k, 4) in addition."""
         return _native.BlockPattern(self.nodes, np.concatenate([self._cliques, stencils]))
+
+
+def _surroundings(whole: Assembly, young: float, threads: int) -> Surroundings:
+    kinds = (("body", whole.bodies), ("obstacle", whole.obstacles), ("plane", whole.planes))
+    names = [member.name or f"{kind} {k}" for kind, members in kinds for k, member in enumerate(members)]
+    rest, faces = whole.system_mesh.positions, whole.surface_faces
+    return Surroundings(rest, faces, whole.groups, len(whole.bodies), names, whole.planes, young, threads)
 
 
 def _cliques(mesh: TetMesh, energies: Sequence[Energy]) -> IntArray:
