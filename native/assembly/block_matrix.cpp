@@ -1,6 +1,8 @@
 #include "assembly/block_matrix.hpp"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 namespace qlb {
 
@@ -15,6 +17,33 @@ void BlockMatrix::shift_diagonal(double amount) {
     double* block = values() + 9 * pattern_->column_begin()[j];
     for (int a = 0; a < 3; ++a) block[4 * a] += amount;
   }
+}
+
+void BlockMatrix::add_stencils(std::span<const std::int32_t> nodes, const double* blocks) {
+  for (std::size_t first = 0; first < nodes.size(); first += 4, blocks += 144)
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        const std::int32_t i = nodes[first + a], j = nodes[first + b];
+        if (i < j) continue;  // its transpose stands for it
+        if (j < 0 || i >= pattern_->nodes())
+          throw std::out_of_range("stencil " + std::to_string(first / 4) + " has a node outside [0, " +
+                                  std::to_string(pattern_->nodes()) + ")");
+        double* to = values() + 9 * pattern_->find(i, j);
+        const double* from = blocks + 36 * a + 3 * b;
+        for (int c = 0; c < 3; ++c)
+          for (int d = 0; d < 3; ++d) to[3 * c + d] += from[12 * c + d];
+      }
+}
+
+void BlockMatrix::set_from(const PatternMap& map, const BlockMatrix& other) {
+  if (&map.outer() != pattern_.get() || &map.inner() != other.pattern_.get())
+    throw std::invalid_argument("the map belongs to other patterns than those of the matrices");
+  double* end = values();  // of what is set
+  for (const PatternMap::Run& run : map.runs()) {
+    std::fill(end, values() + 9 * run.outer, 0.0);
+    end = std::copy_n(other.values() + 9 * run.inner, 9 * run.count, values() + 9 * run.outer);
+  }
+  std::fill(end, values() + values_.size(), 0.0);
 }
 
 void BlockMatrix::multiply(const double* x, double* out) const {

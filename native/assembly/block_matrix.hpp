@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "assembly/block_pattern.hpp"
+#include "assembly/pattern_map.hpp"
 #include "simd/aligned.hpp"
 
 namespace qlb {
@@ -20,6 +21,11 @@ class BlockMatrix {
 
   void set_zero(int threads);
   void shift_diagonal(double amount);
+  // Adds symmetric matrices between up to four nodes: nodes (count, 4), blocks (count, 12, 12). A node that is repeated
+  // takes the sum of its rows and columns. Throws std::out_of_range where the pattern lacks a pair.
+  void add_stencils(std::span<const std::int32_t> nodes, const double* blocks);
+  // What `other` holds, over the inner pattern of the map, and zero elsewhere.
+  void set_from(const PatternMap& map, const BlockMatrix& other);
   // out = A x, both (nodes, 3)
   void multiply(const double* x, double* out) const;
 

@@ -29,6 +29,14 @@ void bind_assembly(nb::module_& m) {
           },
           nb::rv_policy::reference_internal);
 
+  nb::class_<PatternMap>(m, "PatternMap", "Where the blocks of a pattern stand in a larger one of the same nodes.")
+      .def(
+          "__init__",
+          [](PatternMap* self, std::shared_ptr<BlockPattern> inner, std::shared_ptr<BlockPattern> outer) {
+            new (self) PatternMap(std::move(inner), std::move(outer));
+          },
+          nb::arg("inner"), nb::arg("outer"));
+
   nb::class_<BlockMatrix>(m, "BlockMatrix", "Symmetric matrix of 3x3 node blocks over a BlockPattern.")
       .def("__init__",
            [](BlockMatrix* self, std::shared_ptr<BlockPattern> pattern) { new (self) BlockMatrix(std::move(pattern)); })
@@ -41,6 +49,17 @@ void bind_assembly(nb::module_& m) {
           nb::rv_policy::reference_internal)
       .def("set_zero", &BlockMatrix::set_zero, nb::arg("threads"), ReleaseGil())
       .def("shift_diagonal", &BlockMatrix::shift_diagonal, nb::arg("amount"))
+      .def(
+          "add_stencils",
+          [](BlockMatrix& a, const Array<const std::int32_t>& nodes, const Array<const double>& blocks) {
+            if (nodes.size() % 4 != 0) throw std::invalid_argument("nodes must have four entries per stencil");
+            a.add_stencils(view(nodes), sized(blocks, 36 * static_cast<std::int64_t>(nodes.size()), "blocks"));
+          },
+          nb::arg("nodes"), nb::arg("blocks"), ReleaseGil(),
+          "Adds symmetric matrices, shape (k, 12, 12), between the nodes of stencils, shape (k, 4); repeated nodes add "
+          "up.")
+      .def("set_from", &BlockMatrix::set_from, nb::arg("map"), nb::arg("other"), ReleaseGil(),
+           "Takes the values of a matrix over the inner pattern of the map; zero elsewhere.")
       .def(
           "multiply",
           [](const BlockMatrix& a, const Array<const double>& x, const Array<double>& out) {

@@ -1,3 +1,4 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
 #include "bindings/bindings.hpp"
@@ -56,11 +57,14 @@ void bind_supernodal(nb::module_& m) {
   type.def(
           "__init__",
           [](SupernodalCholesky* self, std::shared_ptr<BlockPattern> pattern, const Array<const std::uint8_t>& fixed,
-             int threads, const std::string& precision, const std::string& simd) {
-            new (self) SupernodalCholesky(std::move(pattern), view(fixed), threads, precision_named(precision), simd);
+             int threads, const std::string& precision, const std::string& simd,
+             const std::optional<Array<const std::int32_t>>& order) {
+            new (self) SupernodalCholesky(std::move(pattern), view(fixed), threads, precision_named(precision), simd,
+                                          order ? view(*order) : std::span<const std::int32_t>());
           },
           nb::arg("pattern"), nb::arg("fixed"), nb::arg("threads"), nb::arg("precision"), nb::arg("simd") = "",
-          ReleaseGil())
+          nb::arg("order") = nb::none(), ReleaseGil(),
+          "order: all nodes, shape (n,), in the order of elimination; without it nested dissection (METIS) finds one.")
       .def(
           "solve",
           [](SupernodalCholesky& f, const Array<const double>& b, const Array<double>& x) {
@@ -77,6 +81,13 @@ void bind_supernodal(nb::module_& m) {
             return numpy(std::vector<std::int64_t>(f.order().begin(), f.order().end()));
           },
           nb::rv_policy::move, "Degree of freedom of each row in elimination order.")
+      .def_prop_ro(
+          "node_order",
+          [](const SupernodalCholesky& f) {
+            return numpy(std::vector<std::int32_t>(f.node_order().begin(), f.node_order().end()));
+          },
+          nb::rv_policy::move,
+          "Order of all nodes, shape (n,), that the analysis started from: an extended pattern may reuse it.")
       .def_prop_ro("bytes", &SupernodalCholesky::bytes, "Memory of L.")
       .def_prop_ro("solve_bytes", &SupernodalCholesky::solve_bytes, "Bytes of L that one solve reads.");
   bind_half_solves(type);
@@ -137,7 +148,17 @@ void bind_linalg(nb::module_& m) {
             if (inner.size() != h.size()) throw std::invalid_argument("the inner inverse has another size");
             return h.direction(sized(g, h.size(), "g"), inner, sized(p, h.size(), "p"));
           },
-          nb::arg("g"), nb::arg("inner"), nb::arg("p").noconvert(), ReleaseGil());
+          nb::arg("g"), nb::arg("inner"), nb::arg("p").noconvert(), ReleaseGil())
+      .def(
+          "direction_with",
+          [](Lbfgs& h, const Array<const double>& g, InverseOperator& inner, const RankOneTerms& terms,
+             const Array<double>& p) {
+            if (inner.size() != h.size()) throw std::invalid_argument("the inner inverse has another size");
+            return h.direction_with(sized(g, h.size(), "g"), inner, terms, sized(p, h.size(), "p"));
+          },
+          nb::arg("g"), nb::arg("inner"), nb::arg("terms"), nb::arg("p").noconvert(), ReleaseGil(),
+          "As direction, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and "
+          "`inner` takes in.");
 
   m.def(
       "dot",

@@ -16,6 +16,7 @@ NB_MODULE(_native, m) {
   bind_program(m);
   bind_energies(m);
   bind_linalg(m);
+  bind_low_rank(m);
   m.def("simd_levels", &simd_levels, "SIMD levels this build and this machine can run, the one in use last");
   m.def("material_names", &material_names);
   m.def("libraries", [] {

@@ -1,13 +1,11 @@
-// B^-1 carried along with the material: T B^-1 T^T, T block-diagonal with a map for each node
-// (TetGeometry::nodal_maps).
+// B^-1 carried along with the material: T B^-1 T^T, T as in MaterialFrame.
 #pragma once
 
 #include <memory>
 #include <span>
-#include <vector>
 
-#include "elements/tet_geometry.hpp"
 #include "linalg/cholesky.hpp"
+#include "linalg/material_frame.hpp"
 
 namespace qlb {
 
@@ -18,20 +16,16 @@ class CarriedInverse : public InverseOperator {
                  std::span<const std::uint8_t> fixed, int threads);
 
   // T from how the material has moved between `reference`, where B was taken, and x.
-  void carry(const double* x, const double* reference, double weight);
+  void carry(const double* x, const double* reference, double weight) { frame_.carry(x, reference, weight); }
   // T = 1
-  void reset() { carried_ = false; }
+  void reset() { frame_.reset(); }
 
   std::int64_t size() const override { return inner_->size(); }
   void apply(const double* b, double* x) override;
 
  private:
   std::shared_ptr<InverseOperator> inner_;
-  TetGeometry geometry_;
-  std::vector<std::int64_t> held_nodes_;
-  int threads_;
-  bool carried_ = false;
-  Aligned<double> maps_;  // (nodes, 3, 3)
+  MaterialFrame frame_;
   Aligned<double> right_, solution_;
 };
 

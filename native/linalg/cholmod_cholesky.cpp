@@ -74,7 +74,7 @@ CholmodCholesky::CholmodCholesky(std::shared_ptr<const BlockPattern> pattern, st
     : pattern_(std::move(pattern)), threads_(threads), state_(std::make_unique<State>()) {
   if (static_cast<std::int64_t>(fixed.size()) != size())
     throw std::invalid_argument("fixed must have one entry per degree of freedom");
-  dof_ = nested_dissection(*pattern_, fixed);
+  dof_ = free_dofs(nested_dissection(*pattern_, fixed), fixed);
   if (dof_.empty()) return;
   build_matrix(fixed);
   State& s = *state_;

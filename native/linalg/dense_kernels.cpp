@@ -2,6 +2,7 @@
 // or other shared inline code: it would be compiled for that level too.
 #include "linalg/dense_kernels.hpp"
 
+#include "linalg/dense_columns.hpp"
 #include "linalg/dense_front.hpp"
 #include "linalg/dense_solve.hpp"
 #include "simd/arch.hpp"
@@ -20,7 +21,10 @@ const DenseKernels<T>* make_dense_kernels(const char* level) {
                                           dense::forward_own<V, T>,
                                           dense::forward_below<V, T>,
                                           dense::backward_above<V, T>,
-                                          dense::backward_own<V, T>};
+                                          dense::backward_own<V, T>,
+                                          dense::gram3<V, T>,
+                                          dense::dots3<V, T>,
+                                          dense::subtract3<V, T>};
   return &kernels;
 }
 

@@ -6,7 +6,7 @@
 
 namespace qlb {
 
-std::vector<std::int64_t> nested_dissection(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
+std::vector<std::int32_t> nested_dissection(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
   const std::int64_t nodes = pattern.nodes();
   std::vector<idx_t> rank(nodes, -1), node_of;
   for (std::int64_t i = 0; i < nodes; ++i) {
@@ -40,12 +40,18 @@ std::vector<std::int64_t> nested_dissection(const BlockPattern& pattern, std::sp
       throw std::runtime_error("METIS could not order the matrix");
   }
 
+  std::vector<std::int32_t> result;
+  for (const idx_t k : order) result.push_back(static_cast<std::int32_t>(node_of[k]));
+  for (std::int64_t i = 0; i < nodes; ++i)
+    if (rank[i] < 0) result.push_back(static_cast<std::int32_t>(i));
+  return result;
+}
+
+std::vector<std::int64_t> free_dofs(std::span<const std::int32_t> node_order, std::span<const std::uint8_t> fixed) {
   std::vector<std::int64_t> dofs;
-  for (const idx_t k : order)
-    for (int c = 0; c < 3; ++c) {
-      const std::int64_t dof = 3 * static_cast<std::int64_t>(node_of[k]) + c;
+  for (const std::int32_t node : node_order)
+    for (std::int64_t dof = 3 * std::int64_t{node}; dof < 3 * std::int64_t{node} + 3; ++dof)
       if (!fixed[dof]) dofs.push_back(dof);
-    }
   return dofs;
 }
 

@@ -4,13 +4,28 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "linalg/ordering.hpp"
+
 namespace qlb {
 namespace {
 
-Supernodes checked_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
-  if (static_cast<std::int64_t>(fixed.size()) != 3 * pattern.nodes())
+std::vector<std::int32_t> checked_order(const BlockPattern& pattern, std::span<const std::uint8_t> fixed,
+                                        std::span<const std::int32_t> given) {
+  const std::int64_t nodes = pattern.nodes();
+  if (static_cast<std::int64_t>(fixed.size()) != 3 * nodes)
     throw std::invalid_argument("fixed must have one entry per degree of freedom");
-  return find_supernodes(pattern, fixed);
+  if (given.empty()) return nested_dissection(pattern, fixed);
+  if (static_cast<std::int64_t>(given.size()) != nodes)
+    throw std::invalid_argument("order has " + std::to_string(given.size()) + " nodes, expected all " +
+                                std::to_string(nodes));
+  std::vector<std::uint8_t> seen(nodes, 0);
+  for (const std::int32_t node : given) {
+    if (node < 0 || node >= nodes || seen[node])
+      throw std::invalid_argument("order holds node " + std::to_string(node) + " twice or outside [0, " +
+                                  std::to_string(nodes) + ")");
+    seen[node] = 1;
+  }
+  return {given.begin(), given.end()};
 }
 
 // The power of two nearest above the largest entry: a right-hand side divided by it cannot overflow or vanish in float.
@@ -25,9 +40,11 @@ double power_above(const double* b, std::int64_t size) {
 }  // namespace
 
 SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed,
-                                       int threads, Precision precision, const std::string& simd)
+                                       int threads, Precision precision, const std::string& simd,
+                                       std::span<const std::int32_t> node_order)
     : pattern_(std::move(pattern)),
-      supernodes_(checked_supernodes(*pattern_, fixed)),
+      node_order_(checked_order(*pattern_, fixed, node_order)),
+      supernodes_(find_supernodes(*pattern_, fixed, node_order_)),
       threads_(std::max(threads, 1)),
       simd_(simd) {
   row_of_dof_.assign(size(), -1);
@@ -43,6 +60,7 @@ SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> patte
 
 void SupernodalCholesky::set_precision(Precision precision) {
   ready_ = false;
+  ++version_;
   const auto make = [&]<class T>(T) {
     numeric_ = std::unique_ptr<Numeric<T>>(new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd_),
                                                           HugeBuffer<T>(kRightSides * rows()), std::vector<T>(rows())});
@@ -60,6 +78,7 @@ std::int64_t SupernodalCholesky::bytes() const {
 std::int64_t SupernodalCholesky::factorise(const BlockMatrix& matrix) {
   if (&matrix.pattern() != pattern_.get())
     throw std::invalid_argument("the matrix has another pattern than the factor");
+  ++version_;
   const std::int64_t column =
       std::visit([&](auto& numeric) { return numeric->factor.factorise(matrix.values()); }, numeric_);
   ready_ = column < 0;
@@ -71,21 +90,32 @@ void SupernodalCholesky::check_ready() const {
 }
 
 template <class T>
+double SupernodalCholesky::take(const double* b, T* y) const {
+  const double scale = power_above(b, size()), inverse = 1.0 / scale;
+  for (std::int64_t k = 0; k < rows(); ++k) y[k] = static_cast<T>(inverse * b[supernodes_.dof[k]]);
+  return scale;
+}
+
+template <class T>
+void SupernodalCholesky::give(const T* y, double scale, double* x) const {
+  std::fill(x, x + size(), 0.0);
+  for (std::int64_t k = 0; k < rows(); ++k) x[supernodes_.dof[k]] = scale * y[k];
+}
+
+template double SupernodalCholesky::take(const double*, float*) const;
+template double SupernodalCholesky::take(const double*, double*) const;
+template void SupernodalCholesky::give(const float*, double, double*) const;
+template void SupernodalCholesky::give(const double*, double, double*) const;
+
+template <class T>
 void SupernodalCholesky::solve_sides(Numeric<T>& numeric, const double* b, double* x, int used, int sides) {
   const std::int64_t n = rows();
   T* y = numeric.y.data();
   double scale[kRightSides];
-  for (int r = 0; r < sides; ++r) {
-    scale[r] = r < used ? power_above(b + r * size(), size()) : 1.0;
-    const double inverse = 1.0 / scale[r];
-    for (std::int64_t k = 0; k < n; ++k)
-      y[k + r * n] = r < used ? static_cast<T>(inverse * b[supernodes_.dof[k] + r * size()]) : T(0);
-  }
+  for (int r = 0; r < used; ++r) scale[r] = take(b + r * size(), y + r * n);
+  std::fill(y + used * n, y + sides * n, T(0));
   numeric.factor.solve(y, n, sides);
-  for (int r = 0; r < used; ++r) {
-    std::fill(x + r * size(), x + (r + 1) * size(), 0.0);
-    for (std::int64_t k = 0; k < n; ++k) x[supernodes_.dof[k] + r * size()] = scale[r] * y[k + r * n];
-  }
+  for (int r = 0; r < used; ++r) give(y + r * n, scale[r], x + r * size());
 }
 
 void SupernodalCholesky::solve(const double* b, double* x, std::int64_t count) {

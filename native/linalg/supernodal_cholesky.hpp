@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "linalg/cholesky.hpp"
+#include "linalg/node_columns.hpp"
 #include "linalg/supernodal_factor.hpp"
 
 namespace qlb {
@@ -20,8 +21,9 @@ enum class Precision { float32, float64 };
 class SupernodalCholesky : public Cholesky {
  public:
   // fixed: (nodes, 3), nonzero where held. simd: a level of simd_levels(), or "" for the best.
+  // node_order: all nodes in the order of elimination, or empty for nested dissection.
   SupernodalCholesky(std::shared_ptr<const BlockPattern> pattern, std::span<const std::uint8_t> fixed, int threads,
-                     Precision precision, const std::string& simd = "");
+                     Precision precision, const std::string& simd = "", std::span<const std::int32_t> node_order = {});
 
   // Goes on in another precision; the factor in place is lost.
   void set_precision(Precision precision);
@@ -44,6 +46,26 @@ class SupernodalCholesky : public Cholesky {
   };
   Sparse forward_sparse(std::span<const std::int64_t> dof, std::span<const double> value);
 
+  // x = P^T L^-T f(L^-1 P b), f(T* y) changing y in place, y in elimination order and in the precision of the factor. y
+  // is scaled by a power of two, so f must be linear.
+  template <class F>
+  void solve_with(const double* b, double* x, const F& f);
+
+  // What changes whenever the factor does.
+  std::int64_t version() const { return version_; }
+  void check_ready() const;
+  // Calls f(const SupernodalFactor<T>&) for the precision at hand.
+  template <class F>
+  auto visit_factor(const F& f) const {
+    return std::visit([&](const auto& numeric) { return f(std::as_const(numeric->factor)); }, numeric_);
+  }
+  template <class T>
+  std::unique_ptr<NodeColumns<T>> make_columns(int threads) const {
+    const SupernodalFactor<T>& factor = std::get<std::unique_ptr<Numeric<T>>>(numeric_)->factor;
+    return std::make_unique<NodeColumns<T>>(supernodes_, factor, row_of_dof_, owner_, threads);
+  }
+
+  std::span<const std::int32_t> node_order() const { return node_order_; }  // all nodes; those wholly held come last
   std::span<const std::int64_t> order() const { return supernodes_.dof; }  // degree of freedom of each row
   std::int64_t factor_nonzeros() const override { return nonzeros_; }
   double factor_flops() const override { return flops_; }
@@ -60,12 +82,17 @@ class SupernodalCholesky : public Cholesky {
   using AnyNumeric = std::variant<std::unique_ptr<Numeric<float>>, std::unique_ptr<Numeric<double>>>;
 
   std::int64_t entry_bytes() const { return std::holds_alternative<std::unique_ptr<Numeric<float>>>(numeric_) ? 4 : 8; }
-  void check_ready() const;
   std::vector<std::int32_t> path_to_root(std::span<const std::int64_t> dof) const;
+  // Right-hand sides to elimination order and back, divided by and times a scale; returns the scale.
+  template <class T>
+  double take(const double* b, T* y) const;
+  template <class T>
+  void give(const T* y, double scale, double* x) const;
   template <class T>
   void solve_sides(Numeric<T>& numeric, const double* b, double* x, int used, int sides);
 
   std::shared_ptr<const BlockPattern> pattern_;
+  std::vector<std::int32_t> node_order_;
   Supernodes supernodes_;
   std::vector<std::int32_t> row_of_dof_, owner_;  // -1 where held; supernode of each row
   std::int64_t nonzeros_ = 0;
@@ -73,7 +100,23 @@ class SupernodalCholesky : public Cholesky {
   int threads_;
   std::string simd_;
   bool ready_ = false;
+  std::int64_t version_ = 0;
   AnyNumeric numeric_;
 };
+
+template <class F>
+void SupernodalCholesky::solve_with(const double* b, double* x, const F& f) {
+  check_ready();
+  std::visit(
+      [&](auto& numeric) {
+        auto* y = numeric->y.data();
+        const double scale = take(b, y);
+        numeric->factor.forward(y, rows(), 1);
+        f(y);
+        numeric->factor.backward(y, rows(), 1);
+        give(y, scale, x);
+      },
+      numeric_);
+}
 
 }  // namespace qlb

@@ -50,10 +50,23 @@ class SupernodalFactor {
   // y := L^-1 y over some supernodes only, ascending, with all their ancestors; y is zero in all others.
   void forward_along(std::span<const std::int32_t> path, T* y);
 
+  // As forward_along for kRightSides vectors, work.y, in a work space of the caller's: one factor may serve several
+  // threads. The bits of a vector do not depend on the others, nor on supernodes of the path where it is zero.
+  struct PathWork {
+    explicit PathWork(const SupernodalFactor& factor)
+        : ld(factor.supernodes_.first.back()), y(kRightSides * ld), front(kRightSides * factor.side_ld_) {}
+    std::int64_t ld;  // rows of y
+    HugeBuffer<T> y, front;
+  };
+  void forward_sides_along(std::span<const std::int32_t> path, PathWork& work) const;
+
+  const DenseKernels<T>& kernels() const { return kernels_; }
   std::int64_t bytes() const { return static_cast<std::int64_t>(panels_.bytes()); }
 
  private:
   T* panel(std::int32_t s) { return panels_.data() + panel_begin_[s]; }
+  const T* panel(std::int32_t s) const { return panels_.data() + panel_begin_[s]; }
+  void forward_sides_front(std::int32_t s, PathWork& work) const;
   T* update(std::int32_t s, int thread);
   T* pending(std::int32_t s, int thread);
   std::int64_t update_ld(std::int32_t s) const;

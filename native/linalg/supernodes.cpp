@@ -15,9 +15,9 @@ struct FreeNodes {
   std::vector<std::int32_t> node, weight;  // weight: free degrees of freedom
 };
 
-FreeNodes free_nodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
+FreeNodes free_nodes(std::span<const std::int32_t> node_order, std::span<const std::uint8_t> fixed) {
   FreeNodes free;
-  for (const std::int64_t dof : nested_dissection(pattern, fixed)) {
+  for (const std::int64_t dof : free_dofs(node_order, fixed)) {
     const auto node = static_cast<std::int32_t>(dof / 3);
     if (free.node.empty() || free.node.back() != node) free.node.push_back(node), free.weight.push_back(0);
     ++free.weight.back();
@@ -121,8 +121,9 @@ std::int64_t Supernodes::nonzeros(std::int32_t s) const {
   return columns(s) * (columns(s) + 1) / 2 + columns(s) * rows_below(s);
 }
 
-Supernodes find_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed) {
-  FreeNodes free = free_nodes(pattern, fixed);
+Supernodes find_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed,
+                           std::span<const std::int32_t> node_order) {
+  FreeNodes free = free_nodes(node_order, fixed);
   Graph graph = graph_of(pattern, free.node);
   {
     const std::vector<std::int32_t> order = postorder(elimination_tree(graph), {});

@@ -45,7 +45,8 @@ struct Supernodes {
   std::int64_t nonzeros(std::int32_t s) const;  // entries of its columns in the lower triangle
 };
 
-// fixed: (nodes, 3), nonzero where held.
-Supernodes find_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed);
+// fixed: (nodes, 3), nonzero where held; node_order: all nodes in the order of elimination, up to equivalent ones.
+Supernodes find_supernodes(const BlockPattern& pattern, std::span<const std::uint8_t> fixed,
+                           std::span<const std::int32_t> node_order);
 
 }  // namespace qlb

@@ -27,6 +27,11 @@ class BlockPattern:
     @property
     def rows(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,), writable=False)]: ...
 
+class PatternMap:
+    """Where the blocks of a pattern stand in a larger one of the same nodes."""
+
+    def __init__(self, inner: BlockPattern, outer: BlockPattern) -> None: ...
+
 class BlockMatrix:
     """Symmetric matrix of 3x3 node blocks over a BlockPattern."""
 
@@ -38,6 +43,16 @@ class BlockMatrix:
     def set_zero(self, threads: int) -> None: ...
 
     def shift_diagonal(self, amount: float) -> None: ...
+
+    def add_stencils(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], blocks: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
+        """
+        Adds symmetric matrices, shape (k, 12, 12), between the nodes of stencils, shape (k, 4); repeated nodes add up.
+        """
+
+    def set_from(self, map: PatternMap, other: BlockMatrix) -> None:
+        """
+        Takes the values of a matrix over the inner pattern of the map; zero elsewhere.
+        """
 
     def multiply(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
@@ -281,7 +296,10 @@ class CarriedInverse(InverseOperator):
     def reset(self) -> None: ...
 
 class SupernodalCholesky(Cholesky):
-    def __init__(self, pattern: BlockPattern, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int, precision: str, simd: str = '') -> None: ...
+    def __init__(self, pattern: BlockPattern, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int, precision: str, simd: str = '', order: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        order: all nodes, shape (n,), in the order of elimination; without it nested dissection (METIS) finds one.
+        """
 
     def solve(self, b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """
@@ -295,6 +313,12 @@ class SupernodalCholesky(Cholesky):
     @property
     def order(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]:
         """Degree of freedom of each row in elimination order."""
+
+    @property
+    def node_order(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,))]:
+        """
+        Order of all nodes, shape (n,), that the analysis started from: an extended pattern may reuse it.
+        """
 
     @property
     def bytes(self) -> int:
@@ -334,7 +358,70 @@ class Lbfgs:
 
     def direction(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float: ...
 
+    def direction_with(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, terms: RankOneTerms, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float:
+        """
+        As direction, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and `inner` takes in.
+        """
+
 def dot(a: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int) -> float: ...
+
+class RankOneTerms:
+    """
+    A sum of matrices stiffness a a^T, a = gamma (x) axis at the nodes of each term.
+    """
+
+    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], axis: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
+        """
+        Shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.
+        """
+
+    @property
+    def size(self) -> int: ...
+
+    def __len__(self) -> int: ...
+
+    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0) -> None:
+        """out += scale C K C^T v, both of shape (n, 3)."""
+
+class WoodburyInverse(InverseOperator):
+    """
+    An inverse carried along with the material, with rank-one terms added to the matrix.
+    """
+
+    def __init__(self, factor: InverseOperator, blocks: TetBlocks, fixed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], threads: int) -> None: ...
+
+    def carry(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], reference: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], weight: float) -> None:
+        """
+        Maps from how the material has moved since the factor was made at `reference`; the terms stay.
+        """
+
+    def reset(self) -> None:
+        """Maps of one; the terms stay."""
+
+    def set_terms(self, terms: RankOneTerms) -> bool:
+        """
+        Replaces the terms. False where the sum is not positive definite: it then goes on without any.
+        """
+
+    def forget(self) -> None:
+        """
+        Drops the terms and the half-solves kept: for when the factor is made anew.
+        """
+
+    @property
+    def terms(self) -> int: ...
+
+    @property
+    def active_terms(self) -> int:
+        """Terms with a node that is free."""
+
+    @property
+    def columns(self) -> int:
+        """Nodes whose half-solves are kept."""
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the half-solves and their products."""
 
 def simd_levels() -> list[str]:
     """SIMD levels this build and this machine can run, the one in use last"""

@@ -1,0 +1,70 @@
+#include "bindings/bindings.hpp"
+
+#include "linalg/rank_one_terms.hpp"
+#include "linalg/woodbury_inverse.hpp"
+
+namespace qlb {
+namespace {
+
+void bind_terms(nb::module_& m) {
+  nb::class_<RankOneTerms>(m, "RankOneTerms",
+                           "A sum of matrices stiffness a a^T, a = gamma (x) axis at the nodes of each term.")
+      .def(
+          "__init__",
+          [](RankOneTerms* self, const Array<const std::int32_t>& nodes, const Array<const double>& gamma,
+             const Array<const double>& axis, const Array<const double>& stiffness) {
+            new (self) RankOneTerms(view(nodes), view(gamma), view(axis), view(stiffness));
+          },
+          nb::arg("nodes"), nb::arg("gamma"), nb::arg("axis"), nb::arg("stiffness"),
+          "Shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.")
+      .def_prop_ro("size", &RankOneTerms::size)
+      .def("__len__", &RankOneTerms::size)
+      .def(
+          "add_product",
+          [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale) {
+            terms.check_nodes(static_cast<std::int64_t>(v.size()) / 3);
+            terms.add_product(v.data(), sized(out, static_cast<std::int64_t>(v.size()), "out"), scale);
+          },
+          nb::arg("v"), nb::arg("out").noconvert(), nb::arg("scale") = 1.0, ReleaseGil(),
+          "out += scale C K C^T v, both of shape (n, 3).");
+}
+
+std::shared_ptr<SupernodalCholesky> with_half_solves(const std::shared_ptr<InverseOperator>& factor) {
+  auto found = std::dynamic_pointer_cast<SupernodalCholesky>(factor);
+  if (!found)
+    throw std::invalid_argument("WoodburyInverse works between half-solves, which only SupernodalCholesky has");
+  return found;
+}
+
+}  // namespace
+
+void bind_low_rank(nb::module_& m) {
+  bind_terms(m);
+  nb::class_<WoodburyInverse, InverseOperator>(
+      m, "WoodburyInverse", "An inverse carried along with the material, with rank-one terms added to the matrix.")
+      .def(
+          "__init__",
+          [](WoodburyInverse* self, const std::shared_ptr<InverseOperator>& factor, std::shared_ptr<TetBlocks> blocks,
+             const Array<const std::uint8_t>& fixed, int threads) {
+            new (self) WoodburyInverse(with_half_solves(factor), std::move(blocks), view(fixed), threads);
+          },
+          nb::arg("factor"), nb::arg("blocks"), nb::arg("fixed"), nb::arg("threads"))
+      .def(
+          "carry",
+          [](WoodburyInverse& op, const Array<const double>& x, const Array<const double>& reference, double weight) {
+            op.carry(sized(x, op.size(), "x"), sized(reference, op.size(), "reference"), weight);
+          },
+          nb::arg("x"), nb::arg("reference"), nb::arg("weight"), ReleaseGil(),
+          "Maps from how the material has moved since the factor was made at `reference`; the terms stay.")
+      .def("reset", &WoodburyInverse::reset, ReleaseGil(), "Maps of one; the terms stay.")
+      .def("set_terms", &WoodburyInverse::set_terms, nb::arg("terms"), ReleaseGil(),
+           "Replaces the terms. False where the sum is not positive definite: it then goes on without any.")
+      .def("forget", &WoodburyInverse::forget,
+           "Drops the terms and the half-solves kept: for when the factor is made anew.")
+      .def_prop_ro("terms", &WoodburyInverse::terms)
+      .def_prop_ro("active_terms", &WoodburyInverse::active_terms, "Terms with a node that is free.")
+      .def_prop_ro("columns", &WoodburyInverse::columns, "Nodes whose half-solves are kept.")
+      .def_prop_ro("bytes", &WoodburyInverse::bytes, "Memory of the half-solves and their products.");
+}
+
+}  // namespace qlb

@@ -1,0 +1,56 @@
+#include "linalg/material_frame.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace qlb {
+
+MaterialFrame::MaterialFrame(std::shared_ptr<const TetBlocks> blocks, std::span<const std::uint8_t> fixed, int threads)
+    : geometry_(std::move(blocks), threads), threads_(threads) {
+  if (static_cast<std::int64_t>(fixed.size()) != 3 * nodes())
+    throw std::invalid_argument("fixed must have one entry per degree of freedom of the mesh");
+  for (std::int64_t i = 0; i < nodes(); ++i)
+    if (fixed[3 * i] || fixed[3 * i + 1] || fixed[3 * i + 2]) held_nodes_.push_back(i);
+  maps_.resize(9 * nodes());
+}
+
+void MaterialFrame::carry(const double* x, const double* reference, double weight) {
+  geometry_.nodal_maps(x, reference, weight, maps_.data());
+  for (const std::int64_t i : held_nodes_)
+    for (int k = 0; k < 9; ++k) maps_[9 * i + k] = k % 4 == 0 ? 1.0 : 0.0;
+  carried_ = true;
+}
+
+std::array<double, 3> MaterialFrame::pull_back_at(std::int64_t node, const std::array<double, 3>& v) const {
+  if (!carried_) return v;
+  const double* T = &maps_[9 * node];
+  std::array<double, 3> out;
+  for (int k = 0; k < 3; ++k) out[k] = T[k] * v[0] + T[3 + k] * v[1] + T[6 + k] * v[2];
+  return out;
+}
+
+void MaterialFrame::pull_back(const double* b, double* out) const {
+  if (!carried_) {
+    std::copy_n(b, 3 * nodes(), out);
+    return;
+  }
+#pragma omp parallel for schedule(static) num_threads(threads_) if (nodes() > 16384)
+  for (std::int64_t i = 0; i < nodes(); ++i) {
+    const double *T = &maps_[9 * i], *v = b + 3 * i;
+    for (int k = 0; k < 3; ++k) out[3 * i + k] = T[k] * v[0] + T[3 + k] * v[1] + T[6 + k] * v[2];
+  }
+}
+
+void MaterialFrame::push_forward(const double* b, double* out) const {
+  if (!carried_) {
+    std::copy_n(b, 3 * nodes(), out);
+    return;
+  }
+#pragma omp parallel for schedule(static) num_threads(threads_) if (nodes() > 16384)
+  for (std::int64_t i = 0; i < nodes(); ++i) {
+    const double *T = &maps_[9 * i], *v = b + 3 * i;
+    for (int k = 0; k < 3; ++k) out[3 * i + k] = T[3 * k] * v[0] + T[3 * k + 1] * v[1] + T[3 * k + 2] * v[2];
+  }
+}
+
+}  // namespace qlb

@@ -1,0 +1,41 @@
+// A sum of rank-one matrices, C K C^T = sum_j stiffness_j a_j a_j^T, such as the Hessian of contacts and friction.
+//
+// a_j is gamma_ji axis_j at the nodes i of term j, and zero elsewhere. A node that is repeated in a term adds up.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace qlb {
+
+class RankOneTerms {
+ public:
+  // nodes (count, 4), gamma (count, 4), axis (count, 3), stiffness (count).
+  RankOneTerms(std::span<const std::int32_t> nodes, std::span<const double> gamma, std::span<const double> axis,
+               std::span<const double> stiffness);
+  RankOneTerms() = default;
+
+  std::int64_t size() const { return static_cast<std::int64_t>(stiffness_.size()); }
+  const std::array<std::int32_t, 4>& nodes(std::int64_t j) const { return nodes_[j]; }
+  const std::array<double, 4>& gamma(std::int64_t j) const { return gamma_[j]; }
+  const std::array<double, 3>& axis(std::int64_t j) const { return axis_[j]; }
+  double stiffness(std::int64_t j) const { return stiffness_[j]; }
+
+  // Throws std::invalid_argument where a term has a node outside [0, nodes).
+  void check_nodes(std::int64_t nodes) const;
+
+  double dot(std::int64_t j, const double* v) const;                 // a_j . v, v (nodes, 3)
+  void add(std::int64_t j, double scale, double* out) const;         // out += scale a_j
+  void add_product(const double* v, double* out, double scale) const;  // out += scale C K C^T v
+
+ private:
+  std::vector<std::array<std::int32_t, 4>> nodes_;
+  std::vector<std::array<double, 4>> gamma_;
+  std::vector<std::array<double, 3>> axis_;
+  std::vector<double> stiffness_;
+  std::int32_t last_node_ = -1;
+};
+
+}  // namespace qlb

@@ -1,0 +1,207 @@
+#include "linalg/woodbury_inverse.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace qlb {
+
+WoodburyInverse::WoodburyInverse(std::shared_ptr<SupernodalCholesky> factor, std::shared_ptr<const TetBlocks> blocks,
+                                 std::span<const std::uint8_t> fixed, int threads)
+    : factor_(std::move(factor)), frame_(std::move(blocks), fixed, threads), threads_(std::max(threads, 1)) {
+  if (3 * frame_.nodes() != size()) throw std::invalid_argument("the mesh and the factor differ in size");
+  right_.resize(size());
+  solution_.resize(size());
+}
+
+void WoodburyInverse::carry(const double* x, const double* reference, double weight) {
+  frame_.carry(x, reference, weight);
+  if (terms() > 0 && !express_terms())
+    throw std::runtime_error("with the new frame the matrix is not positive definite: set_terms first");
+}
+
+void WoodburyInverse::reset() {
+  frame_.reset();
+  if (terms() > 0 && !express_terms())
+    throw std::runtime_error("with the new frame the matrix is not positive definite: set_terms first");
+}
+
+void WoodburyInverse::forget() {
+  columns_ = std::monostate();
+  version_ = -1;
+  terms_ = {};
+  active_.clear();
+  used_.clear();
+}
+
+std::int64_t WoodburyInverse::columns() const {
+  return std::visit(
+      []<class C>(const C& columns) -> std::int64_t {
+        if constexpr (std::is_same_v<C, std::monostate>)
+          return 0;
+        else
+          return columns->count();
+      },
+      columns_);
+}
+
+std::int64_t WoodburyInverse::bytes() const {
+  return std::visit(
+      []<class C>(const C& columns) -> std::int64_t {
+        if constexpr (std::is_same_v<C, std::monostate>)
+          return 0;
+        else
+          return columns->bytes();
+      },
+      columns_);
+}
+
+bool WoodburyInverse::set_terms(RankOneTerms terms) {
+  terms.check_nodes(frame_.nodes());
+  factor_->check_ready();
+  terms_ = std::move(terms);
+  return express_terms();
+}
+
+bool WoodburyInverse::express_terms() {
+  const bool good = factor_->visit_factor([&]<class T>(const SupernodalFactor<T>&) { return express(columns_of<T>()); });
+  if (!good) {
+    terms_ = {};
+    active_.clear();
+  }
+  return good;
+}
+
+template <class T>
+NodeColumns<T>& WoodburyInverse::columns_of() {
+  using Columns = std::unique_ptr<NodeColumns<T>>;
+  if (version_ != factor_->version() || !std::holds_alternative<Columns>(columns_)) {
+    columns_ = factor_->make_columns<T>(threads_);
+    version_ = factor_->version();
+  }
+  return *std::get<Columns>(columns_);
+}
+
+template <class T>
+bool WoodburyInverse::express(NodeColumns<T>& columns) {
+  std::vector<std::int32_t> nodes;
+  for (std::int64_t j = 0; j < terms_.size(); ++j)
+    for (int i = 0; i < 4; ++i)
+      if (terms_.stiffness(j) != 0.0 && terms_.gamma(j)[i] != 0.0) nodes.push_back(terms_.nodes(j)[i]);
+  columns.make(nodes);
+
+  active_.clear();
+  used_.clear();
+  for (std::int64_t j = 0; j < terms_.size(); ++j)
+    if (const Active term = in_frame(columns, j); term.count > 0) {
+      active_.push_back(term);
+      used_.insert(used_.end(), term.column, term.column + term.count);
+    }
+  // An order that does not depend on which columns were made first: sums must not, to the last bit.
+  std::sort(used_.begin(), used_.end(),
+            [&](std::int32_t a, std::int32_t b) { return columns.first_row(a) < columns.first_row(b); });
+  used_.erase(std::unique(used_.begin(), used_.end()), used_.end());
+  std::vector<std::int32_t> place(columns.count());
+  for (std::size_t k = 0; k < used_.size(); ++k) place[used_[k]] = static_cast<std::int32_t>(k);
+  for (Active& term : active_)
+    for (int i = 0; i < term.count; ++i) term.place[i] = place[term.column[i]];
+  if (active_.empty()) return true;
+
+  const auto negative = std::stable_partition(active_.begin(), active_.end(), [](const Active& a) { return a.positive; });
+  small_.resize(active_terms(), negative - active_.begin());
+  columns.join(used_);
+  form_small_matrix(columns);
+  return small_.factorise();
+}
+
+template <class T>
+auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) const -> Active {
+  Active term;
+  term.positive = terms_.stiffness(j) > 0.0;
+  const double root = std::sqrt(std::abs(terms_.stiffness(j)));
+  if (root == 0.0) return term;
+  for (int i = 0; i < 4; ++i) {
+    const std::int32_t node = terms_.nodes(j)[i];
+    const double weight = root * terms_.gamma(j)[i];
+    if (weight == 0.0 || columns.held(node)) continue;
+    const std::int32_t column = columns.find(node);
+    const std::array<double, 3> axis = frame_.pull_back_at(node, terms_.axis(j));
+    const auto end = term.column + term.count;
+    const auto at = std::find(term.column, end, column) - term.column;
+    if (at == term.count) {
+      term.column[term.count++] = column;
+      std::fill_n(term.u[at], 3, 0.0);
+    }
+    for (int c = 0; c < 3; ++c) term.u[at][c] += weight * axis[c];
+  }
+  return term;
+}
+
+// S_jl = sign_j delta_jl + sum over the nodes a of j and b of l of u_ja^T G_ab u_lb: for each l first all of G u_l.
+template <class T>
+void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
+  const std::int64_t count = active_terms(), length = 3 * columns.count();
+#pragma omp parallel num_threads(threads_) if (threads_ > 1 && count > 32)
+  {
+    std::vector<double> product(length);
+#pragma omp for schedule(dynamic, 4)
+    for (std::int64_t l = 0; l < count; ++l) {
+      std::fill(product.begin(), product.end(), 0.0);
+      double* to = product.data();
+      for (int i = 0; i < active_[l].count; ++i) {
+        const double *u = active_[l].u[i], *g0 = columns.gram_row(active_[l].column[i], 0);
+        const double *g1 = columns.gram_row(active_[l].column[i], 1), *g2 = columns.gram_row(active_[l].column[i], 2);
+#pragma omp simd
+        for (std::int64_t k = 0; k < length; ++k) to[k] += u[0] * g0[k] + u[1] * g1[k] + u[2] * g2[k];
+      }
+      double* S = small_.column(l);
+      for (std::int64_t j = l; j < count; ++j) {
+        double sum = 0.0;
+        for (int i = 0; i < active_[j].count; ++i) {
+          const double *u = active_[j].u[i], *v = to + 3 * std::int64_t{active_[j].column[i]};
+          sum += u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+        }
+        S[j] = sum;
+      }
+      S[l] += active_[l].positive ? 1.0 : -1.0;
+    }
+  }
+}
+
+// y -= W S^-1 W^T y
+template <class T>
+void WoodburyInverse::correct(NodeColumns<T>& columns, T* y) {
+  node_products_.resize(3 * used_.size());
+  term_products_.resize(active_.size());
+  columns.dots(used_, y, node_products_.data());
+  for (std::size_t j = 0; j < active_.size(); ++j) {
+    const Active& term = active_[j];
+    double sum = 0.0;
+    for (int i = 0; i < term.count; ++i)
+      for (int c = 0; c < 3; ++c) sum += term.u[i][c] * node_products_[3 * term.place[i] + c];
+    term_products_[j] = sum;
+  }
+  small_.solve(term_products_.data());
+  std::fill(node_products_.begin(), node_products_.end(), 0.0);
+  for (std::size_t j = 0; j < active_.size(); ++j) {
+    const Active& term = active_[j];
+    for (int i = 0; i < term.count; ++i)
+      for (int c = 0; c < 3; ++c) node_products_[3 * term.place[i] + c] += term.u[i][c] * term_products_[j];
+  }
+  columns.subtract(used_, node_products_.data(), y);
+}
+
+void WoodburyInverse::apply(const double* b, double* x) {
+  if (!active_.empty() && version_ != factor_->version())
+    throw std::logic_error("the factor was made anew since the terms were set: forget them and set them again");
+  frame_.pull_back(b, right_.data());
+  if (active_.empty())
+    factor_->apply(right_.data(), solution_.data());
+  else
+    factor_->solve_with(right_.data(), solution_.data(), [&]<class T>(T* y) {
+      correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), y);
+    });
+  frame_.push_forward(solution_.data(), x);
+}
+
+}  // namespace qlb

@@ -1,0 +1,82 @@
+// (A + C K C^T)^-1 for the carried factor A^-1 = T (L L^T)^-1 T^T (CarriedInverse) and rank-one terms, by Woodbury:
+//
+//   (A + C K C^T)^-1 = A^-1 - A^-1 C (K^-1 + C^T A^-1 C)^-1 C^T A^-1
+//
+// All is done between the two half-solves. With W = L^-1 P T^T C |K|^1/2 and S = sign(K) + W^T W, the result is
+// T P^T L^-T (1 - W S^-1 W^T) L^-1 P T^T. W is never formed: it is put together from NodeColumns, and W^T W from their
+// products.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "linalg/dense_cholesky.hpp"
+#include "linalg/material_frame.hpp"
+#include "linalg/node_columns.hpp"
+#include "linalg/rank_one_terms.hpp"
+#include "linalg/supernodal_cholesky.hpp"
+
+namespace qlb {
+
+class WoodburyInverse : public InverseOperator {
+ public:
+  // fixed: (nodes, 3), as the factor has it; a node with a held axis keeps T = 1.
+  WoodburyInverse(std::shared_ptr<SupernodalCholesky> factor, std::shared_ptr<const TetBlocks> blocks,
+                  std::span<const std::uint8_t> fixed, int threads);
+
+  // T from how the material has moved between `reference`, where A was factorised, and x; T = 1. The terms stay.
+  void carry(const double* x, const double* reference, double weight);
+  void reset();
+
+  // Replaces the terms; negative ones take away. Returns false, and goes on without any, where the sum is not positive
+  // definite: with negative terms alone can that be.
+  bool set_terms(RankOneTerms terms);
+  // Drops the terms and all that was kept: for when the factor is made anew.
+  void forget();
+
+  std::int64_t size() const override { return factor_->size(); }
+  void apply(const double* b, double* x) override;
+
+  std::int64_t terms() const { return terms_.size(); }
+  std::int64_t active_terms() const { return static_cast<std::int64_t>(active_.size()); }  // those not wholly held
+  std::int64_t columns() const;  // nodes whose half-solves are kept
+  std::int64_t bytes() const;    // that they and their products take
+
+ private:
+  // A term in the frame of the factor: |k|^1/2 T_i^T axis gamma_i at up to four columns.
+  struct Active {
+    int count = 0;
+    bool positive = true;
+    std::int32_t column[4], place[4];  // in NodeColumns; among those in use
+    double u[4][3];
+  };
+  using AnyColumns = std::variant<std::monostate, std::unique_ptr<NodeColumns<float>>,
+                                  std::unique_ptr<NodeColumns<double>>>;
+  bool express_terms();
+  template <class T>
+  NodeColumns<T>& columns_of();
+  template <class T>
+  bool express(NodeColumns<T>& columns);
+  template <class T>
+  Active in_frame(const NodeColumns<T>& columns, std::int64_t term) const;
+  template <class T>
+  void form_small_matrix(const NodeColumns<T>& columns);
+  template <class T>
+  void correct(NodeColumns<T>& columns, T* y);
+
+  std::shared_ptr<SupernodalCholesky> factor_;
+  MaterialFrame frame_;
+  int threads_;
+  AnyColumns columns_;
+  std::int64_t version_ = -1;  // of the factor that the columns belong to
+  RankOneTerms terms_;
+  std::vector<Active> active_;      // the positive ones first
+  std::vector<std::int32_t> used_;  // columns in use, in elimination order
+  DenseCholesky small_;
+  std::vector<double> node_products_, term_products_;
+  Aligned<double> right_, solution_;
+};
+
+}  // namespace qlb

@@ -1,0 +1,378 @@
+"""The kept factor with rank-one terms against dense inverses, by numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from qlb import TetMesh, _native
+from qlb.system import System
+from tests.support import Array, dense, elastic_hessian, make_system, random_rotation
+
+PRECISIONS = ["float64", "float32"]
+TOLERANCE = {"float64": 1e-10, "float32": 1e-3}
+
+
+@dataclass
+class Terms:
+    """The terms as NumPy arrays, and as a dense matrix."""
+
+    nodes: NDArray[np.int32]
+    gamma: Array
+    axis: Array
+    stiffness: Array
+
+    @property
+    def native(self) -> _native.RankOneTerms:
+        return _native.RankOneTerms(self.nodes, self.gamma, self.axis, self.stiffness)
+
+    def columns(self, nodes: int) -> Array:
+        """a_j as columns, shape (3 nodes, k)."""
+        count = len(self.nodes)
+        a = np.zeros((count, nodes, 3))
+        for slot in range(4):
+            a[np.arange(count), self.nodes[:, slot]] += self.gamma[:, slot, None] * self.axis
+        return a.reshape(count, 3 * nodes).T
+
+    def dense(self, nodes: int) -> Array:
+        C = self.columns(nodes)
+        return (C * self.stiffness) @ C.T
+
+
+def random_terms(rng: np.random.Generator, candidates: NDArray[np.int32], count: int, stiffness: object) -> Terms:
+    """Contacts of two and four nodes and, every third, of one node with a plane."""
+    nodes = rng.choice(candidates, size=(count, 4)).astype(np.int32)
+    gamma = rng.dirichlet(np.ones(4), size=count) * np.array([1, 1, -1, -1])
+    nodes[::3] = nodes[::3, :1]
+    gamma[::3] = [1.0, 0.0, 0.0, 0.0]
+    axis = rng.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    return Terms(nodes, gamma, axis, np.broadcast_to(np.asarray(stiffness, dtype=np.float64), (count,)).copy())
+
+
+class Body:
+    """A box, somewhat deformed, with some held nodes and axes: its factor, and the dense inverse behind it."""
+
+    def __init__(self, precision: str, *, cells: tuple[int, int, int] = (6, 3, 3), threads: int = 1) -> None:
+        rng = np.random.default_rng(5)
+        self.mesh = TetMesh.box((1.0, 0.5, 0.5), cells=cells)
+        self.system: System = make_system(self.mesh, mass="consistent")
+        self.count = len(self.mesh.positions)
+        self.reference = self.mesh.positions + 0.005 * rng.normal(size=self.mesh.positions.shape)
+        self.x = (self.reference + 0.01 * rng.normal(size=self.reference.shape)) @ random_rotation(rng).T
+        self.fixed = np.zeros((self.count, 3), dtype=np.uint8)
+        self.fixed[self.mesh.positions[:, 0] < 1e-9] = 1
+        self.fixed[self.count // 2, 1] = 1
+        self.factor = _native.SupernodalCholesky(self.system.pattern, self.fixed, threads, precision)
+        self.factorise(1e4)
+        self.inverse = _native.WoodburyInverse(self.factor, self.system.blocks, self.fixed, threads)
+        self.carried = False
+
+    def factorise(self, mass: float) -> None:
+        self.matrix = elastic_hessian(self.system, self.reference, project=True)
+        self.system.inertia.add_hessian(mass, self.matrix)
+        assert self.factor.factorise(self.matrix) == -1
+
+    def carry(self) -> None:
+        self.inverse.carry(self.x, self.reference, 0.3)
+        self.carried = True
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        return self.fixed.ravel() == 0
+
+    def maps(self) -> Array:
+        """T as a dense matrix, with identities where an axis is held."""
+        T = np.zeros((self.count, 3, self.count, 3))
+        maps = np.tile(np.eye(3), (self.count, 1, 1))
+        if self.carried:
+            self.system.geometry.nodal_maps(self.x, self.reference, 0.3, maps)
+            maps[self.fixed.any(axis=1)] = np.eye(3)
+        T[np.arange(self.count), :, np.arange(self.count), :] = maps
+        return T.reshape(3 * self.count, 3 * self.count)
+
+    def expected(self, terms: Terms) -> Array:
+        """(T^-T B T^-1 + C K C^T)^-1 over the free degrees of freedom."""
+        free = np.ix_(self.free, self.free)
+        inner = np.zeros((self.free.size, self.free.size))
+        inner[free] = np.linalg.inv(dense(self.matrix, self.system.pattern)[free])
+        T = self.maps()
+        whole = np.zeros_like(inner)
+        whole[free] = np.linalg.inv(np.linalg.inv((T @ inner @ T.T)[free]) + terms.dense(self.count)[free])
+        return whole
+
+    def stiffness(self) -> float:
+        """A stiffness [kg] like those on the diagonal."""
+        return float(np.trace(dense(self.matrix, self.system.pattern))) / (3 * self.count)
+
+    def terms(self, count: int, factor: object = 1.0, seed: int = 0) -> Terms:
+        """Terms at nodes all over the body, some of them held."""
+        rng = np.random.default_rng(seed)
+        scale = np.asarray(factor) * self.stiffness() * rng.uniform(0.5, 2.0, size=count)
+        return random_terms(rng, np.arange(self.count, dtype=np.int32), count, scale)
+
+
+def apply(op: _native.InverseOperator, sides: Array) -> Array:
+    """Each row of `sides` solved for."""
+    out = np.full_like(sides, np.nan)
+    for b, x in zip(sides, out, strict=True):
+        op.apply(b, x)
+    return out
+
+
+def dense_inverse(body: Body) -> Array:
+    return apply(body.inverse, np.eye(3 * body.count)).T
+
+
+def assert_close(actual: Array, expected: Array, precision: str) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=TOLERANCE[precision] * np.abs(expected).max())
+
+
+@pytest.fixture(params=PRECISIONS)
+def precision(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.mark.parametrize("carried", [False, True])
+@pytest.mark.parametrize("count", [0, 1, 7, 300])
+def test_inverse_is_that_of_the_dense_sum(precision: str, count: int, carried: bool) -> None:
+    body = Body(precision)
+    if carried:
+        body.carry()
+    terms = body.terms(count)
+    assert body.inverse.set_terms(terms.native)
+    assert body.inverse.terms == count
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+
+
+def test_without_terms_it_is_the_carried_inverse(precision: str, rng: np.random.Generator) -> None:
+    body = Body(precision)
+    carried = _native.CarriedInverse(body.factor, body.system.blocks, body.fixed, 1)
+    b = rng.normal(size=(1, 3 * body.count))
+    np.testing.assert_array_equal(apply(body.inverse, b), apply(carried, b))
+    body.carry()
+    carried.carry(body.x, body.reference, 0.3)
+    np.testing.assert_array_equal(apply(body.inverse, b), apply(carried, b))
+    body.inverse.reset()
+    np.testing.assert_array_equal(apply(body.inverse, b), apply(body.factor, b))
+
+
+@pytest.mark.parametrize("negative", [1, 20, 150])
+def test_terms_that_are_in_the_factor_are_taken_away(negative: int) -> None:
+    # A + C K C^T as the factor's own matrix, less C K C^T, plus others.
+    body = Body("float64")
+    pattern = _native.BlockPattern(body.count, np.arange(body.count, dtype=np.int32)[None])
+    taken, added = body.terms(negative, seed=1), body.terms(200, seed=2)
+    elastic, matrix = body.matrix, _native.BlockMatrix(pattern)
+    matrix.set_from(_native.PatternMap(body.system.pattern, pattern), elastic)
+    matrix.add_stencils(taken.nodes, stencils(taken))
+    factor = _native.SupernodalCholesky(pattern, body.fixed, 1, "float64")
+    assert factor.factorise(matrix) == -1
+    inverse = _native.WoodburyInverse(factor, body.system.blocks, body.fixed, 1)
+    both = join(replace(taken, stiffness=-taken.stiffness), added)
+    shuffled = np.random.default_rng(3).permutation(len(both.nodes))
+    both = Terms(*(np.ascontiguousarray(part[shuffled]) for part in vars(both).values()))
+    assert inverse.set_terms(both.native)
+    assert_close(apply(inverse, np.eye(3 * body.count)).T, body.expected(added), "float64")
+
+
+def test_taking_away_too_much_is_told_and_leaves_no_terms(precision: str, rng: np.random.Generator) -> None:
+    body = Body(precision)
+    b = rng.normal(size=(1, 3 * body.count))
+    before = apply(body.inverse, b)
+    assert body.inverse.set_terms(body.terms(30).native)
+    terms = body.terms(30)
+    terms.stiffness[17] *= -1e3
+    assert not body.inverse.set_terms(terms.native)
+    assert body.inverse.terms == 0
+    np.testing.assert_array_equal(apply(body.inverse, b), before)
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e12])
+def test_tiny_and_huge_stiffness(precision: str, factor: float) -> None:
+    body = Body(precision)
+    body.carry()
+    scale = np.ones(60)
+    scale[::2] = factor
+    terms = body.terms(60, scale)
+    assert body.inverse.set_terms(terms.native)
+    found, expected = dense_inverse(body), body.expected(body.terms(60, np.minimum(scale, 1e7)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=(1e-6 if precision == "float64" else 1e-3) * expected.max())
+
+
+def test_equal_terms_count_twice(precision: str) -> None:
+    body = Body(precision)
+    terms = body.terms(40, 1e6)
+    assert body.inverse.set_terms(join(terms, terms).native)
+    twice = dense_inverse(body)
+    assert body.inverse.set_terms(replace(terms, stiffness=2 * terms.stiffness).native)
+    assert_close(twice, dense_inverse(body), precision)
+
+
+def test_terms_at_held_nodes_are_passed_over(precision: str, rng: np.random.Generator) -> None:
+    body = Body(precision)
+    held = np.flatnonzero(body.fixed.all(axis=1)).astype(np.int32)
+    assert len(held) > 4
+    terms = random_terms(rng, held, 20, body.stiffness())
+    assert body.inverse.set_terms(terms.native)
+    assert (body.inverse.terms, body.inverse.active_terms, body.inverse.columns) == (20, 0, 0)
+    some = join(terms, body.terms(10))
+    assert body.inverse.set_terms(some.native)
+    assert body.inverse.active_terms <= 10
+    assert_close(dense_inverse(body), body.expected(some), precision)
+
+
+def test_columns_are_kept_and_make_no_difference(precision: str) -> None:
+    body, fresh = Body(precision), Body(precision)
+    for seed, count in ((1, 5), (2, 300), (3, 2), (4, 40)):
+        terms = body.terms(count, seed=seed)
+        assert body.inverse.set_terms(terms.native)
+    assert body.inverse.columns > fresh.inverse.columns == 0
+    assert fresh.inverse.set_terms(terms.native)
+    np.testing.assert_array_equal(dense_inverse(body), dense_inverse(fresh))
+    columns, size = body.inverse.columns, body.inverse.bytes
+    assert body.inverse.set_terms(terms.native)
+    assert (body.inverse.columns, body.inverse.bytes) == (columns, size)
+
+
+def test_carrying_on_keeps_the_terms(precision: str) -> None:
+    body = Body(precision)
+    terms = body.terms(50)
+    assert body.inverse.set_terms(terms.native)
+    body.carry()
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+    body.inverse.reset()
+    body.carried = False
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+
+
+def test_a_new_factor_is_not_taken_for_the_old_one(precision: str) -> None:
+    body = Body(precision)
+    terms = body.terms(50)
+    assert body.inverse.set_terms(terms.native)
+    body.factorise(3e5)
+    with pytest.raises(RuntimeError, match="factor was made anew"):
+        dense_inverse(body)
+    body.inverse.forget()
+    assert (body.inverse.columns, body.inverse.terms, body.inverse.bytes) == (0, 0, 0)
+    assert_close(dense_inverse(body), body.expected(body.terms(0)), precision)
+    assert body.inverse.set_terms(terms.native)
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+    body.factorise(1e4)
+    assert body.inverse.set_terms(terms.native)  # forgets by itself
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+
+
+def test_precision_may_change(rng: np.random.Generator) -> None:
+    body = Body("float32")
+    terms = body.terms(50)
+    assert body.inverse.set_terms(terms.native)
+    body.factor.set_precision("float64")
+    body.factorise(1e4)
+    assert body.inverse.set_terms(terms.native)
+    assert_close(dense_inverse(body), body.expected(terms), "float64")
+
+
+def test_bits_do_not_depend_on_the_number_of_threads(precision: str, rng: np.random.Generator) -> None:
+    found = []
+    for threads in (1, 2, 3, 8):
+        body = Body(precision, cells=(12, 8, 8), threads=threads)
+        body.carry()
+        assert body.inverse.set_terms(body.terms(500).native)
+        b = np.random.default_rng(1).normal(size=(1, 3 * body.count))
+        found.append(apply(body.inverse, b))
+    for x in found[1:]:
+        np.testing.assert_array_equal(x, found[0])
+
+
+def test_several_hundred_terms_of_both_signs(rng: np.random.Generator) -> None:
+    # More than one panel of the small matrix of each sign; what is added once is taken away again.
+    body = Body("float64", cells=(8, 4, 4))
+    kept, passing = body.terms(150, seed=1), body.terms(400, seed=2)
+    gone = replace(passing, stiffness=-passing.stiffness)
+    assert body.inverse.set_terms(join(join(gone, kept), passing).native)
+    assert_close(dense_inverse(body), body.expected(kept), "float64")
+
+
+def test_separate_bodies_do_not_meet(precision: str) -> None:
+    # Terms that couple two bodies whose factors share no supernode.
+    mesh = TetMesh.box((1.0, 0.5, 0.5), cells=(3, 2, 2))
+    count = len(mesh.positions)
+    two = TetMesh(np.concatenate([mesh.positions, mesh.positions + 2]), np.concatenate([mesh.tets, mesh.tets + count]))
+    system = make_system(two, mass="consistent")
+    matrix = elastic_hessian(system, two.positions, project=True)
+    system.inertia.add_hessian(1e4, matrix)
+    fixed = np.zeros((2 * count, 3), dtype=np.uint8)
+    factor = _native.SupernodalCholesky(system.pattern, fixed, 1, precision)
+    assert factor.factorise(matrix) == -1
+    inverse = _native.WoodburyInverse(factor, system.blocks, fixed, 1)
+    full = dense(matrix, system.pattern)
+    terms = random_terms(np.random.default_rng(2), np.arange(2 * count, dtype=np.int32), 80, full.trace() / len(full))
+    assert inverse.set_terms(terms.native)
+    expected = np.linalg.inv(full + terms.dense(2 * count))
+    assert_close(apply(inverse, np.eye(len(full))).T, expected, precision)
+
+
+def stencils(terms: Terms) -> Array:
+    """The terms as matrices between their four slots, shape (k, 12, 12)."""
+    a = (terms.gamma[:, :, None] * terms.axis[:, None, :]).reshape(-1, 12)
+    return terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :]
+
+
+def join(a: Terms, b: Terms) -> Terms:
+    return Terms(*(np.concatenate(parts) for parts in zip(vars(a).values(), vars(b).values(), strict=True)))
+
+
+def test_product_with_terms_is_that_of_the_dense_matrix(rng: np.random.Generator) -> None:
+    terms = random_terms(rng, np.arange(9, dtype=np.int32), 30, rng.normal(size=30))
+    v, out = rng.normal(size=(2, 9, 3))
+    expected = out.ravel() - 0.7 * terms.dense(9) @ v.ravel()
+    native = terms.native
+    assert native.size == len(native) == 30
+    native.add_product(v, out, -0.7)
+    np.testing.assert_allclose(out.ravel(), expected, rtol=0, atol=1e-12)
+
+
+def broken(name: str, value: object) -> Callable[[Terms], Terms]:
+    def change(terms: Terms) -> Terms:
+        part = getattr(terms, name).copy()
+        part[2] = value
+        return replace(terms, **{name: part})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (broken("nodes", -1), "term 2 has node -1, expected at least 0"),
+        (broken("gamma", np.nan), "gamma of term 2 is nan"),
+        (broken("axis", np.inf), "axis of term 2 is inf"),
+        (broken("stiffness", np.nan), "stiffness of term 2 is nan"),
+        (lambda t: replace(t, axis=t.axis[:-1]), "axis has 12 entries, expected 15"),
+    ],
+)
+def test_terms_that_make_no_sense_are_refused(
+    change: Callable[[Terms], Terms], message: str, rng: np.random.Generator
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        _ = change(random_terms(rng, np.arange(9, dtype=np.int32), 5, 1.0)).native
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    body = Body("float32", cells=(2, 1, 1))
+    far = random_terms(np.random.default_rng(0), np.array([body.count], dtype=np.int32), 1, 1.0)
+    with pytest.raises(ValueError, match=rf"node {body.count}, outside \[0, {body.count}\)"):
+        body.inverse.set_terms(far.native)
+    with pytest.raises(ValueError, match=f"node {body.count}"):
+        far.native.add_product(np.zeros((body.count, 3)), np.zeros((body.count, 3)), 1.0)
+    cholmod = _native.CholmodCholesky(body.system.pattern, body.fixed, 1)
+    with pytest.raises(ValueError, match="half-solves, which only SupernodalCholesky has"):
+        _native.WoodburyInverse(cholmod, body.system.blocks, body.fixed, 1)
+    unready = _native.SupernodalCholesky(body.system.pattern, body.fixed, 1, "float32")
+    with pytest.raises(RuntimeError, match="factorise first"):
+        _native.WoodburyInverse(unready, body.system.blocks, body.fixed, 1).set_terms(body.terms(1).native)
