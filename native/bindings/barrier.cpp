@@ -71,8 +71,14 @@ void bind_potential(nb::module_& m) {
           nb::arg("surface"), nb::arg("dhat"), nb::arg("stiffness"), nb::arg("threads"), nb::arg("kind") = "barrier")
       .def("evaluate", &evaluate, nb::arg("x"), nb::arg("vertex_faces"), nb::arg("edge_edges"), nb::arg("planes"),
            nb::arg("plane_allowed"), nb::arg("scale"), nb::arg("gradient").noconvert(),
-           nb::arg("edge_sign") = nb::none(), ReleaseGil())
-      .def("hessian_blocks", &hessian_blocks, nb::arg("x"), nb::arg("contacts"), nb::arg("project"));
+           nb::arg("edge_sign") = nb::none(), ReleaseGil(),
+           "The contacts at x (n, 3) [m] among the pairs vertex_faces (k, 2) [node, face] and edge_edges (l, 2) and "
+           "between all vertices and the planes (q, 4) [unit normal, offset] that hold out their groups "
+           "(plane_allowed (q, groups)). Adds scale times the gradient of the energy to gradient (n, 3). "
+           "edge_sign (l) int8, for a penalty: -1 where two edges have passed through each other.")
+      .def("hessian_blocks", &hessian_blocks, nb::arg("x"), nb::arg("contacts"), nb::arg("project"),
+           "The Hessian of each contact (size, 12, 12) at the x where `contacts` were found, scaled as they are. "
+           "project: to the nearest positive semidefinite matrices.");
 }
 
 void bind_friction(nb::module_& m) {
@@ -105,7 +111,9 @@ void bind_friction(nb::module_& m) {
                               sized(gradient, size, "gradient"));
           },
           nb::arg("x"), nb::arg("x_base"), nb::arg("epsilon"), nb::arg("scale"), nb::arg("gradient").noconvert(),
-          ReleaseGil());
+          ReleaseGil(),
+          "The friction of slips from x_base to x (n, 3) [m]; below the slip epsilon [m] it holds. Adds scale times "
+          "the gradient of the energy to gradient (n, 3).");
 }
 
 }  // namespace

@@ -70,13 +70,9 @@ struct Barrier::Contact {
   }
 
   void add_gradient(double* gradient) const {
-    for (int i = 0; i < 4; ++i) {
-      const Vec3 g = -force * gamma[i] * normal + (i % 2 == 0 ? -1.0 : 1.0) * turn[i / 2];
-      double* to = gradient + 3 * static_cast<std::int64_t>(nodes[i]);
-      to[0] += g.x;
-      to[1] += g.y;
-      to[2] += g.z;
-    }
+    for (int i = 0; i < 4; ++i)
+      add3(-force * gamma[i] * normal + (i % 2 == 0 ? -1.0 : 1.0) * turn[i / 2],
+           gradient + 3 * static_cast<std::int64_t>(nodes[i]));
   }
 
   void append_to(ContactSet& set) const {
@@ -98,7 +94,12 @@ struct Barrier::Contact {
 
 Barrier::Barrier(std::shared_ptr<const ContactSurface> surface, double dhat, double stiffness, int threads,
                  const std::string& kind)
-    : surface_(std::move(surface)), dhat_(dhat), stiffness_(stiffness), threads_(threads), penalty_(kind == "penalty") {
+    : surface_(std::move(surface)),
+      dhat_(dhat),
+      stiffness_(stiffness),
+      threads_(threads),
+      penalty_(kind == "penalty"),
+      reach_((penalty_ ? 2.0 : 1.0) * dhat) {
   check_positive(dhat, "dhat");
   check_positive(stiffness, "stiffness");
   if (threads < 1) throw std::invalid_argument("threads is " + std::to_string(threads) + ", must be 1 or more");
@@ -116,6 +117,9 @@ void Barrier::check(const Candidates& candidates, const Planes& planes) const {
   if (!candidates.edge_sign.empty() && 2 * candidates.edge_sign.size() != candidates.edge_edges.size())
     throw std::invalid_argument("edge_sign has " + std::to_string(candidates.edge_sign.size()) +
                                 " entries, expected one per pair of edges");
+  for (const std::int8_t sign : candidates.edge_sign)
+    if (sign != 1 && sign != -1)
+      throw std::invalid_argument("edge_sign holds " + std::to_string(sign) + ", must be 1 or -1");
   if (planes.planes.size() % 4 != 0) throw std::invalid_argument("planes must have shape (q, 4)");
   if (static_cast<std::int64_t>(planes.allowed.size()) != planes.size() * surface_->groups())
     throw std::invalid_argument("plane_allowed must have shape (planes, groups)");
@@ -131,32 +135,32 @@ Derivatives Barrier::potential(double distance, double weight) const {
   return {unit * dhat_ * f.value, unit * f.first, unit / dhat_ * f.second};
 }
 
-// Fills in what depends on the positions; false where the two are out of reach of each other.
-bool Barrier::pair(const double* x, Contact& c, double scale) const {
-  const std::array<Vec3, 4> at = positions(x, c.nodes);
-  const double reach = (penalty_ ? 2.0 : 1.0) * dhat_;
-  const bool faces = c.kind == ContactKind::vertex_face;
-  if (faces ? boxes_apart<1>(at, reach) : boxes_apart<2>(at, reach)) return false;
+// Keeps the contact, filled in with what depends on the positions `at`, if the two are in reach of each other.
+void Barrier::keep_near(const std::array<Vec3, 4>& at, Contact&& c, std::vector<Contact>& found) const {
   const Separation s = separation(c.kind, at, c.sign);
-  if (!in_reach(s.distance)) return false;
-  c.weight *= scale;
+  if (!in_reach(s.distance)) return;
   c.gamma = s.closest.gamma;
   c.normal = s.normal;
   c.distance = s.distance;
-  c.evaluate(potential(s.distance, c.weight), faces ? Mollifier{} : edge_mollifier(at, c.threshold));
-  return true;
+  c.evaluate(potential(s.distance, c.weight),
+             c.kind == ContactKind::edge_edge ? edge_mollifier(at, c.threshold) : Mollifier{});
+  found.push_back(c);
 }
 
 void Barrier::vertex_face(const double* x, const std::int32_t* candidate, double scale,
                           std::vector<Contact>& found) const {
-  const std::int32_t node = candidate[0];
-  const auto& [a, b, c] = surface_->faces()[candidate[1]];
-  Contact contact{.kind = ContactKind::vertex_face,
-                  .key = contact_key(ContactKind::vertex_face, node, candidate[1]),
-                  .nodes = {node, a, b, c},
-                  .groups = {surface_->group(node), surface_->group(a)},
-                  .weight = 0.5 * surface_->node_area(node)};
-  if (pair(x, contact, scale)) found.push_back(contact);
+  const auto [node, face] = std::pair(candidate[0], candidate[1]);
+  const auto& [a, b, c] = surface_->faces()[face];
+  const std::array<std::int32_t, 4> nodes{node, a, b, c};
+  const std::array<Vec3, 4> at = positions(x, nodes);
+  if (boxes_apart<1>(at, reach_)) return;
+  keep_near(at,
+            {.kind = ContactKind::vertex_face,
+             .key = contact_key(ContactKind::vertex_face, node, face),
+             .nodes = nodes,
+             .groups = {surface_->group(node), surface_->group(a)},
+             .weight = scale * 0.5 * surface_->node_area(node)},
+            found);
 }
 
 // The edge of lower index comes first, so that a pair is the same contact whichever way round it is named.
@@ -164,14 +168,18 @@ void Barrier::edge_edge(const double* x, const std::int32_t* candidate, std::int
                         std::vector<Contact>& found) const {
   const auto [first, second] = std::minmax(candidate[0], candidate[1]);
   const auto &a = surface_->edges()[first], &b = surface_->edges()[second];
-  Contact contact{.kind = ContactKind::edge_edge,
-                  .key = contact_key(ContactKind::edge_edge, first, second),
-                  .nodes = {a[0], a[1], b[0], b[1]},
-                  .groups = {surface_->group(a[0]), surface_->group(b[0])},
-                  .weight = 0.25 * (surface_->edge_area(first) + surface_->edge_area(second)),
-                  .threshold = 1e-3 * surface_->edge_length2(first) * surface_->edge_length2(second),
-                  .sign = sign};
-  if (pair(x, contact, scale)) found.push_back(contact);
+  const std::array<std::int32_t, 4> nodes{a[0], a[1], b[0], b[1]};
+  const std::array<Vec3, 4> at = positions(x, nodes);
+  if (boxes_apart<2>(at, reach_)) return;
+  keep_near(at,
+            {.kind = ContactKind::edge_edge,
+             .key = contact_key(ContactKind::edge_edge, first, second),
+             .nodes = nodes,
+             .groups = {surface_->group(a[0]), surface_->group(b[0])},
+             .weight = scale * 0.25 * (surface_->edge_area(first) + surface_->edge_area(second)),
+             .threshold = 1e-3 * surface_->edge_length2(first) * surface_->edge_length2(second),
+             .sign = sign},
+            found);
 }
 
 void Barrier::vertex_planes(const double* x, std::int32_t node, const Planes& planes, double scale,

@@ -49,9 +49,9 @@ class Barrier {
   struct Contact;
   void check(const Candidates& candidates, const Planes& planes) const;
   Separation separation(ContactKind kind, const std::array<Vec3, 4>& x, double sign) const;
-  bool in_reach(double distance) const { return distance < dhat_ && (!penalty_ || distance > -2.0 * dhat_); }
+  bool in_reach(double distance) const { return distance < dhat_ && (!penalty_ || distance > -reach_); }
   Derivatives potential(double distance, double weight) const;
-  bool pair(const double* x, Contact& contact, double scale) const;
+  void keep_near(const std::array<Vec3, 4>& at, Contact&& contact, std::vector<Contact>& found) const;
   void vertex_face(const double* x, const std::int32_t* candidate, double scale, std::vector<Contact>& found) const;
   void edge_edge(const double* x, const std::int32_t* candidate, std::int8_t sign, double scale,
                  std::vector<Contact>& found) const;
@@ -62,6 +62,7 @@ class Barrier {
   double dhat_, stiffness_;
   int threads_;
   bool penalty_;
+  double reach_;  // a pair farther apart is no contact; nor is one that much inside
 };
 
 }  // namespace qlb

@@ -11,12 +11,8 @@ namespace {
 using Vec12 = std::array<double, 12>;
 
 Vec12 outer(const std::array<double, 4>& gamma, Vec3 a) {
-  Vec12 out;
-  for (int i = 0; i < 4; ++i) {
-    out[3 * i] = gamma[i] * a.x;
-    out[3 * i + 1] = gamma[i] * a.y;
-    out[3 * i + 2] = gamma[i] * a.z;
-  }
+  Vec12 out{};
+  for (int i = 0; i < 4; ++i) add3(gamma[i] * a, &out[3 * i]);
   return out;
 }
 
@@ -72,13 +68,8 @@ void add_distance_hessian(double s, const std::array<Vec3, 4>& x, const Separati
 
 // dc/dx
 Vec12 cross_gradient(const Mollifier& mollifier) {
-  Vec12 out;
-  for (int i = 0; i < 4; ++i) {
-    const Vec3 a = (i % 2 == 0 ? -1.0 : 1.0) * mollifier.c_slope[i / 2];
-    out[3 * i] = a.x;
-    out[3 * i + 1] = a.y;
-    out[3 * i + 2] = a.z;
-  }
+  Vec12 out{};
+  for (int i = 0; i < 4; ++i) add3((i % 2 == 0 ? -1.0 : 1.0) * mollifier.c_slope[i / 2], &out[3 * i]);
   return out;
 }
 

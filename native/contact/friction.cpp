@@ -62,13 +62,8 @@ FrictionTerms Friction::evaluate(const double* x, const double* base, std::int64
     const Vec3 along = c1 * t1 + c2 * t2, across = c1 * t2 - c2 * t1;
     const Derivatives f = smooth_friction(y, epsilon);
     terms.energy += unit * f.value;
-    for (int i = 0; i < 4; ++i) {
-      const Vec3 g = unit * f.first * c.gamma[i] * along;
-      double* to = gradient + 3 * static_cast<std::int64_t>(c.nodes[i]);
-      to[0] += g.x;
-      to[1] += g.y;
-      to[2] += g.z;
-    }
+    for (int i = 0; i < 4; ++i)
+      add3(unit * f.first * c.gamma[i] * along, gradient + 3 * static_cast<std::int64_t>(c.nodes[i]));
     const double hold = y < epsilon ? (2.0 - y / epsilon) / epsilon : 1.0 / y;  // f1(y)/y
     for (const auto& [axis, stiffness] : {std::pair(along, f.second), std::pair(across, hold)}) {
       terms.nodes.push_back(c.nodes);

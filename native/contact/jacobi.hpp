@@ -17,7 +17,8 @@ template <int n>
 void jacobi_rotate(Square<n>& A, Square<n>& vectors, int p, int q) {
   const double theta = (A[q][q] - A[p][p]) / (2.0 * A[p][q]);
   const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::sqrt(theta * theta + 1.0));
-  const double c = 1.0 / std::sqrt(t * t + 1.0), s = t * c;
+  const double c = 1.0 / std::sqrt(t * t + 1.0), s = t * c, change = t * A[p][q];
+  const double pp = A[p][p] - change, qq = A[q][q] + change;
   for (int k = 0; k < n; ++k) {
     const double a = A[p][k], b = A[q][k], v = vectors[p][k], w = vectors[q][k];
     A[p][k] = c * a - s * b;
@@ -26,10 +27,11 @@ void jacobi_rotate(Square<n>& A, Square<n>& vectors, int p, int q) {
     vectors[q][k] = s * v + c * w;
   }
   for (int k = 0; k < n; ++k) {
-    const double a = A[k][p], b = A[k][q];
-    A[k][p] = c * a - s * b;
-    A[k][q] = s * a + c * b;
+    A[k][p] = A[p][k];
+    A[k][q] = A[q][k];
   }
+  A[p][p] = pp;
+  A[q][q] = qq;
   A[p][q] = A[q][p] = 0.0;
 }
 
@@ -50,7 +52,7 @@ void jacobi_eigen(Square<n>& A, Square<n>& vectors) {
     if (!(off > 1e-28 * all)) return;
     for (int p = 0; p < n; ++p)
       for (int q = p + 1; q < n; ++q)
-        if (A[p][q] != 0.0) detail::jacobi_rotate<n>(A, vectors, p, q);
+        if (A[p][q] * A[p][q] > 1e-30 / (n * n) * all) detail::jacobi_rotate<n>(A, vectors, p, q);
   }
 }
 

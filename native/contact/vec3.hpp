@@ -30,5 +30,10 @@ inline Vec3 cross(Vec3 a, Vec3 b) {
 inline double norm(Vec3 a) {
   return std::sqrt(dot(a, a));
 }
+inline void add3(Vec3 a, double* p) {
+  p[0] += a.x;
+  p[1] += a.y;
+  p[2] += a.z;
+}
 
 }  // namespace qlb

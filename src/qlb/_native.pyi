@@ -121,9 +121,15 @@ class Barrier:
 
     def __init__(self, surface: ContactSurface, dhat: float, stiffness: float, threads: int, kind: str = 'barrier') -> None: ...
 
-    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], vertex_faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], edge_edges: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], planes: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], plane_allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], edge_sign: Annotated[NDArray[numpy.int8], dict(order='C', device='cpu', writable=False)] | None = None) -> ContactSet: ...
+    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], vertex_faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], edge_edges: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], planes: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], plane_allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], edge_sign: Annotated[NDArray[numpy.int8], dict(order='C', device='cpu', writable=False)] | None = None) -> ContactSet:
+        """
+        The contacts at x (n, 3) [m] among the pairs vertex_faces (k, 2) [node, face] and edge_edges (l, 2) and between all vertices and the planes (q, 4) [unit normal, offset] that hold out their groups (plane_allowed (q, groups)). Adds scale times the gradient of the energy to gradient (n, 3). edge_sign (l) int8, for a penalty: -1 where two edges have passed through each other.
+        """
 
-    def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]: ...
+    def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]:
+        """
+        The Hessian of each contact (size, 12, 12) at the x where `contacts` were found, scaled as they are. project: to the nearest positive semidefinite matrices.
+        """
 
 class FrictionTerms:
     """Friction's energy and its Hessian, two rank-one terms a contact."""
@@ -151,7 +157,10 @@ class Friction:
     @property
     def size(self) -> int: ...
 
-    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x_base: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], epsilon: float, scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> FrictionTerms: ...
+    def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], x_base: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], epsilon: float, scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> FrictionTerms:
+        """
+        The friction of slips from x_base to x (n, 3) [m]; below the slip epsilon [m] it holds. Adds scale times the gradient of the energy to gradient (n, 3).
+        """
 
 class Candidates:
     """

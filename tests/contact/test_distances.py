@@ -20,7 +20,7 @@ def all_contacts(kind: int, four: Array) -> _native.ContactSet:
 
 
 def assert_distances(found: _native.ContactSet, expected: Array) -> None:
-    np.testing.assert_allclose(found.distance, expected, rtol=0, atol=1e-14 * 16)
+    np.testing.assert_allclose(found.distance, expected, rtol=0, atol=2e-13)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -51,8 +51,8 @@ def test_weights_and_normal_make_the_vector_between_the_closest_points(kind: int
     four = rng.normal(size=(COUNT, 4, 3))
     found = all_contacts(kind, four)
     apart = np.einsum("ki,kic->kc", found.gamma, four)
-    np.testing.assert_allclose(apart, found.distance[:, None] * found.normal, atol=1e-14 * 16)
-    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, atol=1e-15 * 8)
+    np.testing.assert_allclose(apart, found.distance[:, None] * found.normal, atol=2e-13)
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, atol=1e-14)
     split = 1 if kind == VERTEX_FACE else 2
     np.testing.assert_allclose(found.gamma[:, :split].sum(axis=1), 1.0, atol=1e-14)
     np.testing.assert_allclose(found.gamma[:, split:].sum(axis=1), -1.0, atol=1e-14)

@@ -135,3 +135,5 @@ def test_edge_signs_must_be_one_per_pair() -> None:
     scene = Scene.of(EDGE_EDGE)
     with pytest.raises(ValueError, match="edge_sign has 2 entries, expected one per pair of edges"):
         scene.evaluate(make_barrier(scene), np.zeros((6, 3)), 1.0, np.ones(2, dtype=np.int8))
+    with pytest.raises(ValueError, match="edge_sign holds 0, must be 1 or -1"):
+        scene.evaluate(make_barrier(scene), np.zeros((6, 3)), 1.0, sign_of(0))
