@@ -105,7 +105,7 @@ class ContactModel:
         gaps = self.plane_gaps(x, self.offsets(time))
         if gaps.size and not gaps.min() > 0:
             v, q = np.unravel_index(np.argmin(gaps), gaps.shape)
-            plane = self.around.names[len(self.around.names) - len(self.around.planes) + q]
+            plane = self.around.names[len(self.around.names) - len(self.around.planes) + int(q)]
             count = int((gaps <= 0).sum())
             return f"{self.describe(self.vertices[v])} is {-gaps[v, q]:.4g} m behind {plane}{_more(count, 'node')}"
         pairs = self.candidates.intersections(x)

@@ -13,6 +13,7 @@ from qlb.integrators.integrator import Origin, Stage
 from qlb.timing import Timer
 
 PLANE_SHARE = 0.9  # of the way to a plane that a step may go
+MARGIN = 0.25  # of dhat, by which candidates outlast the motion that they were searched for
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,7 @@ class StageContact:
         p = np.zeros_like(x) if p is None else p
         with self._timer.section("candidates"):
             if not candidates.covers(x, p):
-                reach = float(np.abs(p).max())
-                candidates.build(x, p, dhat + 0.5 * min(reach, 10 * dhat), dhat)
+                candidates.build(x, p, MARGIN * dhat, dhat)
 
     def bound(self, x: FloatArray, p: FloatArray, *, moving_planes: bool = False) -> float:
         """The largest part of a step p (n, 3) [m] from `x` that keeps all gaps open; 1 where the whole step does.

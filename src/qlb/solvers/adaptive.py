@@ -45,8 +45,9 @@ class QLA(FactoredLbfgs):
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
         super().__init__(system, settings, tolerance)
         self.system = system
-        self.inverse: _native.CarriedInverse
-        self.inverse = _native.CarriedInverse(self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
+        kept = (self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
+        self._low_rank = None if system.contact is None else _native.WoodburyInverse(*kept)
+        self._carried = self._low_rank or _native.CarriedInverse(*kept)
         self.kappa = cost_of_factor(self.factor.cholesky, self.settings.precision, len(system.mesh.tets))
         """Cost of assembly and factorisation, in iterations."""
         self._stretch = stretch_weight(system.incompressibility)
@@ -54,6 +55,16 @@ class QLA(FactoredLbfgs):
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
         self._solves = self._spent = 0  # solves with this factor, and their iterations
         self._stale = False
+
+    @property
+    def inverse(self) -> _native.InverseOperator:
+        """B^-1, carried along, with the contacts of the moment."""
+        return self._carried
+
+    @property
+    def columns(self) -> int:
+        """Nodes whose half-solves are kept for contact."""
+        return 0 if self._low_rank is None else self._low_rank.columns
 
     def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Start the account of a solve."""
@@ -69,17 +80,26 @@ class QLA(FactoredLbfgs):
         self._mark(point)
         if self.settings.carry_factor:
             with problem.timer.section("solve"):
-                self.inverse.carry(point.x, self._reference, self._stretch)
+                self._carried.carry(point.x, self._reference, self._stretch)
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H g, H from the pairs over the carried factor, which is made anew where contraction is too slow."""
-        if self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
+        touches = point.contact is not None and point.contact.count > 0  # then what is slow is contact being found
+        if self.settings.refactor_in_solve and not touches and self._needed(point) > self.kappa + PATIENCE:
             self._refactor(problem, point, self.settings.projection)
-        return super().direction(problem, point)
+        if self._low_rank is None or point.contact is None:
+            return super().direction(problem, point)
+        with problem.timer.section("contact"):
+            terms = _native.RankOneTerms(*point.contact.terms())
+            self._low_rank.set_terms(terms)
+        with problem.timer.section("solve"):
+            p = np.empty_like(point.gradient)
+            slope = self.history.direction_with(point.gradient, self._low_rank, terms, p)
+            return p, slope
 
     def accept(self, old: Point, new: Point) -> None:
-        """Store the pair and count the iteration."""
-        super().accept(old, new)
+        """Store the pair, of the gradient without contact, and count the iteration."""
+        self.history.push(old.x, new.x, old.smooth, new.smooth)
         self._iterations += 1
 
     def end_solve(self) -> None:
@@ -124,7 +144,9 @@ class QLA(FactoredLbfgs):
             then = StageProblem(self.system, stage, State(0.0, self._reference, stage.v_b), Timer())
             values = then.hessian(self._reference, project=bool(projected)).values
         self.factor.restore(values, projected=bool(projected), raised=bool(raised))
-        self.inverse.reset()
+        self._carried.reset()
+        if self._low_rank is not None:
+            self._low_rank.forget()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
         self._reference = None  # until the new factor stands
@@ -132,7 +154,9 @@ class QLA(FactoredLbfgs):
             projection = "always"
         self.factor.update(problem, point.x, projection)
         self._indefinite = self.factor.projected
-        self.inverse.reset()
+        self._carried.reset()
+        if self._low_rank is not None:
+            self._low_rank.forget()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)
         self._solves = self._spent = 0

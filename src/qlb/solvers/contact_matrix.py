@@ -47,7 +47,7 @@ class ContactMatrix:
         missing = ~self._holds(nodes)
         if missing.any():
             self._extend(nodes)
-        self._matrix.set_from(elastic, self._map)
+        self._matrix.set_from(self._map, elastic)
         self._matrix.add_stencils(nodes, blocks)
         if contact.friction is not None:
             self._matrix.add_stencils(*self._onto_free(contact.friction.nodes, _blocks(contact.friction)))

@@ -81,16 +81,15 @@ class Descent(ABC):
     def _solve_with_contact(self, problem: StageProblem) -> SolveResult:
         """`minimise`, from where a way that passes through nothing leads."""
         lead = LeadIn(problem, predict=self.settings.initial_guess == "predictor")
-        result = None
+        result = SolveResult.start(problem.origin.positions, lead.reference)
         while not lead.arrived:
             x = lead.advance()
             if x is None:
-                assert result is not None
                 return lead.blocked(result)
-            result = self.minimise(problem, SolveResult.start(x, result, lead.reference))
+            result = self.minimise(problem, replace(result, positions=x))
             lead.relaxed(result.positions)
-            if not lead.arrived and not result.reason.converged:
-                return result
+            if not result.reason.converged:
+                break
         return result
 
     def minimise(self, problem: StageProblem, earlier: SolveResult | None = None) -> SolveResult:

@@ -72,10 +72,9 @@ class SolveResult:
     """more about a failure, in words"""
 
     @staticmethod
-    def start(x: FloatArray, earlier: SolveResult | None, reference: float) -> SolveResult:
-        """Where a solve is to begin: at `x` (n, 3) [m], its rows to be added to those of an `earlier` one."""
-        rows = [] if earlier is None else earlier.rows
-        return SolveResult(x, Reason.MAX_ITERATIONS, inf, reference, rows)
+    def start(x: FloatArray, reference: float) -> SolveResult:
+        """No solve yet, which is to begin at `x` (n, 3) [m]."""
+        return SolveResult(x, Reason.MAX_ITERATIONS, inf, reference)
 
     @property
     def iterations(self) -> int:

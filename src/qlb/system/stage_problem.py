@@ -46,7 +46,7 @@ class StageProblem:
         guess: FloatArray | None = None,
         origin: Origin | None = None,
     ) -> None:
-        """`guess` (n, 3) [m]: where terms take what they lag; the predictor by default. `origin`: `state` by default."""
+        """`guess` (n, 3) [m]: where terms take what they lag; the predictor by default. `origin`: `state`, too."""
         self.system = system
         self.stage = stage
         self.timer = timer

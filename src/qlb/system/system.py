@@ -215,8 +215,9 @@ class System:
 
 
 def _surroundings(whole: Assembly, young: float, threads: int) -> Surroundings:
-    kinds = (("body", whole.bodies), ("obstacle", whole.obstacles), ("plane", whole.planes))
-    names = [member.name or f"{kind} {k}" for kind, members in kinds for k, member in enumerate(members)]
+    names = [body.name or f"body {k}" for k, body in enumerate(whole.bodies)]
+    names += [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(whole.obstacles)]
+    names += [plane.name or f"plane {k}" for k, plane in enumerate(whole.planes)]
     rest, faces = whole.system_mesh.positions, whole.surface_faces
     return Surroundings(rest, faces, whole.groups, len(whole.bodies), names, whole.planes, young, threads)
 
