@@ -74,7 +74,8 @@ class Parts:
         vertices = arrays.get("obstacle_vertices", np.empty((0, 3)))
         nodes = len(mesh.positions) + len(vertices)
         shapes: dict[str, tuple[int | None, ...]] = {"groups": (nodes,), "body_names": (None,)} if several else {}
-        shapes |= {"obstacle_names": (None,), "obstacle_triangles": (None, 3)} if len(vertices) else {}
+        if len(vertices):
+            shapes |= {"obstacle_names": (None,), "obstacle_vertices": (None, 3), "obstacle_triangles": (None, 3)}
         shapes |= {"planes": (None, 6)} if "planes" in arrays else {}
         arrays = read_arrays(path, shapes)
         triangles = arrays.get("obstacle_triangles", np.empty((0, 3))).astype(np.int32)
