@@ -18,8 +18,9 @@ ClosestPoints closest_points(const std::array<Vec3, 4>& x) {
 
 namespace detail {
 
-// The time for which the slab normal to n that lies between the primitives stays at least `kept` wide, n a unit vector
-// from the second to the first: every n.(x_a - x_b) + t n.(p_a - p_b) >= kept. Infinite if it never gets narrower.
+// The time for which the slab normal to the unit vector n that lies between the primitives, the first on the side n
+// points to, is at least `kept` wide: every n.(x_a - x_b) + t n.(p_a - p_b) >= kept. Infinite if it never gets
+// narrower, 0 if it is too narrow or there is none.
 template <int first>
 double time_of_slab(const std::array<Vec3, 4>& x, const std::array<Vec3, 4>& p, Vec3 n, double kept) {
   double height[4], speed[4], time = INFINITY;
@@ -29,13 +30,37 @@ double time_of_slab(const std::array<Vec3, 4>& x, const std::array<Vec3, 4>& p, 
   }
   for (int a = 0; a < first; ++a)
     for (int b = first; b < 4; ++b) {
-      const double closing = speed[b] - speed[a];
-      if (closing <= 0.0) continue;
-      const double t = (height[a] - height[b] - kept) / closing;
-      if (std::isnan(t)) return 0.0;
-      time = std::min(time, t);
+      const double spare = height[a] - height[b] - kept, closing = speed[b] - speed[a];
+      if (!(spare > 0.0) || std::isnan(closing)) return 0.0;
+      if (closing > 0.0) time = std::min(time, spare / closing);
     }
   return time;
+}
+
+// Along the line of the closest points. w is rounded by a part of the size of the primitives, which may be as large as
+// w; what of it lies along the edge that it must be normal to is taken off.
+inline Vec3 closest_direction(const ClosestPoints& closest, const std::array<Vec3, 4>& x) {
+  Vec3 w = closest.apart;
+  if (closest.parameters == 1) {
+    Vec3 edge;
+    for (int i = 0; i < 4; ++i) edge = edge + closest.slope[0][i] * x[i];
+    w = w - (dot(w, edge) / dot(edge, edge)) * edge;
+  }
+  return (1.0 / norm(w)) * w;
+}
+
+// Normal to the face or to both edges, without the rounding of w; not a number where there is none.
+template <int first>
+Vec3 common_normal(const ClosestPoints& closest, const std::array<Vec3, 4>& x) {
+  const Vec3 normal = first == 1 ? cross(x[2] - x[1], x[3] - x[1]) : cross(x[1] - x[0], x[3] - x[2]);
+  return (std::copysign(1.0, dot(normal, closest.apart)) / norm(normal)) * normal;
+}
+
+template <int first>
+double free_time(const ClosestPoints& closest, const std::array<Vec3, 4>& x, const std::array<Vec3, 4>& p,
+                 double kept) {
+  const double time = time_of_slab<first>(x, p, closest_direction(closest, x), kept);
+  return time >= 1.0 ? time : std::max(time, time_of_slab<first>(x, p, common_normal<first>(closest, x), kept));
 }
 
 inline bool move_alike(const std::array<Vec3, 4>& p) {
@@ -47,14 +72,14 @@ inline bool move_alike(const std::array<Vec3, 4>& p) {
 }  // namespace detail
 
 // The largest t in [0, 1] found for which the distance of the primitives, nodes [0, first) and [first, 4), at
-// x + t' p is at least slack times that at x for all t' <= t. 0 only if they touch at x and move.
+// x + t' p is at least slack times that at x for all t' <= t. 0 only if they touch at x, to rounding, and move.
 //
 // Additive continuous collision detection (Li, Kaufman, Jiang 2021, "Codimensional incremental potential contact",
-// algorithm 1): step by a time that is surely free, look at the distance, step again. Their bound of the speed at which
-// the distance d shrinks is the largest |p_a| + |p_b|; ours is the speed along the line of the closest points. The
-// slab between two planes normal to that line, one through each closest point, separates the convex primitives, so
-// that their distance is at least its width for as long as no node enters it. That time is never shorter than theirs,
-// and primitives that slide past each other are through in one step. Any t reached is safe, hence the cap.
+// algorithm 1): step by a time that is surely free, look at the distance, step again; any t reached is safe, hence the
+// cap. Theirs is the time in which the distance d shrinks at its greatest speed, max |p_a| + max |p_b|. Ours is the
+// time for which a slab lies between the primitives: they are convex, so that they are at least its width apart until
+// a node enters it. The slab normal to the line of the closest points is d wide, and nodes enter it no faster than
+// that. So the time is never shorter, and primitives that slide past each other are through in one step.
 //
 // Stops as soon as t > enough; the value is then only known to be above `enough`.
 template <int first>
@@ -67,7 +92,7 @@ double additive_ccd(std::array<Vec3, 4> x, const std::array<Vec3, 4>& p, double 
   const double kept = slack * distance, near = (slack + kResolution) * distance;
   double t = 0.0;
   for (int step = 0; step < kSteps; ++step) {
-    const double free = detail::time_of_slab<first>(x, p, (1.0 / distance) * closest.apart, kept);
+    const double free = detail::free_time<first>(closest, x, p, kept);
     if (t + free >= 1.0) return 1.0;
     if (!(free > 0.0)) break;
     t += free;

@@ -159,7 +159,7 @@ def assemble(
 def _checked(what: str, given: Iterable[T], *kinds: type) -> tuple[T, ...]:
     allowed = " or ".join(kind.__name__ for kind in kinds)
     if not isinstance(given, Iterable):
-        raise InputError(f"{what} = {given!r} must be a sequence of {allowed}")
+        raise InputError(f"{what} = {type(given).__name__} must be a sequence of {allowed}")
     members = tuple(given)
     for k, member in enumerate(members):
         if not isinstance(member, kinds):

@@ -12,14 +12,17 @@ from qlb.arrays import FloatArray
 
 @dataclass(frozen=True)
 class State:
-    """Positions and velocities at a time, and the state one step earlier where there is one."""
+    """Positions and velocities at a time, and the state one step earlier where there is one.
+
+    Rows are the nodes of the system: n of the bodies, then q of the obstacles.
+    """
 
     time: float
     """[s]"""
     positions: FloatArray
-    """[m], shape (n, 3)"""
+    """[m], shape (n + q, 3)"""
     velocities: FloatArray
-    """[m/s], shape (n, 3)"""
+    """[m/s], shape (n + q, 3)"""
     previous: State | None = None
 
     def without_history(self) -> State:

@@ -42,7 +42,8 @@ def _read(path: Path) -> Any:
     if path.stat().st_size == 0:
         raise InputError(f"mesh file {path} is empty")
     try:
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # its readers print
+        # Its readers print, and count in few bits where they guess whether an STL is text.
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(over="ignore"):
             return meshio.read(path)
     except (Exception, SystemExit) as error:  # its readers raise whatever they stumble over
         reason = str(error).strip().splitlines()

@@ -4,8 +4,11 @@ Format version 1::
 
     run.json            {"format": "qlb run", "version": 1, "created": ISO 8601}: the marker, written first
     scene.yaml          the resolved scene
-    mesh.npz            positions [m] (n, 3) at rest, tets (m, 4)
-    frames/000000.npz   step, time [s], positions [m] (n, 3), velocities [m/s] (n, 3); named by the step
+    mesh.npz            positions [m] (n, 3) at rest, tets (m, 4) of all bodies; where there are several, or obstacles:
+                        groups (n + q,), body_names; obstacle_names, obstacle_vertices [m] (q, 3) at rest,
+                        obstacle_triangles (t, 3); planes (p, 6), a point [m] and the normal of each
+    frames/000000.npz   step, time [s], positions [m] (n + q, 3), velocities [m/s] (n + q, 3), those of obstacles last;
+                        plane_points [m] (p, 3) where there are planes; named by the step
     stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
     checkpoint.npz      what a run needs to go on to the same bits, as of the last frame
     summary.json        the run in numbers; its status is "running" until the end

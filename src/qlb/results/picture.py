@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from math import ceil
 from pathlib import Path
 from types import ModuleType
@@ -20,12 +20,14 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
 from qlb.results import style
 from qlb.results.errors import MissingExtra, RenderingFailed
 from qlb.results.run import Frame, Run
+from qlb.results.scenery import Scenery
 
 Image = npt.NDArray[np.uint8]
 
@@ -56,7 +58,8 @@ def render_frames(
 ) -> None:
     """Render chosen frames side by side into one PNG, all from the same camera.
 
-    The surface is coloured by the distance of each node from its place at rest; the rest shape is drawn faintly.
+    The surface is coloured by the distance of each node from its place at rest, or where there are several bodies by
+    the body; the rest shape is drawn faintly. Obstacles and planes are grey.
 
     Args:
         run: the run.
@@ -76,12 +79,13 @@ def render_frames(
     if not frames:
         raise InputError(f"run {run.directory} has no frames to render")
     surface = _Surface.of(run, frames)
-    camera = _Camera.facing(np.concatenate([surface.rest, *surface.deformed]))
+    scenery = Scenery.of(run, frames)
+    camera = _Camera.facing(np.concatenate([surface.everywhere, scenery.around(surface.everywhere)]))
     grid = _Grid.best(len(frames), camera.extent, size)
     with _opengl_window(window):
-        images = _render(pyvista, surface, camera, grid)
+        images = _render(pyvista, surface, scenery, camera, grid)
     with style.look():
-        style.save(_compose(images, frames, surface.largest, grid), path)
+        style.save(_compose(images, frames, surface, grid), path)
 
 
 def _spread(steps: Sequence[int], count: int = 6) -> list[int]:
@@ -93,17 +97,40 @@ def _spread(steps: Sequence[int], count: int = 6) -> list[int]:
 
 @dataclass(frozen=True)
 class _Surface:
-    """The boundary of the body, at rest and in each frame."""
+    """The boundary of all bodies, at rest and in each frame."""
 
     triangles: IntArray
     rest: FloatArray
     deformed: list[FloatArray]
+    body: IntArray
+    """of each node, shape (k,)"""
+    names: tuple[str, ...]
+    """of the bodies"""
 
     @staticmethod
     def of(run: Run, frames: Sequence[Frame]) -> _Surface:
         nodes, renumbered = np.unique(run.mesh.boundary_triangles(), return_inverse=True)
         triangles = renumbered.reshape(-1, 3).astype(np.int32)
-        return _Surface(triangles, run.mesh.positions[nodes], [frame.positions[nodes] for frame in frames])
+        deformed = [frame.positions[nodes] for frame in frames]
+        parts = run.parts
+        return _Surface(triangles, run.mesh.positions[nodes], deformed, parts.groups[nodes], parts.body_names)
+
+    @cached_property
+    def everywhere(self) -> FloatArray:
+        """All positions that are shown [m], shape (k, 3)."""
+        return np.concatenate([self.rest, *self.deformed])
+
+    @property
+    def colours(self) -> list[str]:
+        """The colour of each body, where there are several."""
+        return [style.LINES[b % len(style.LINES)] for b in range(len(self.names))]
+
+    def scalars(self, x: FloatArray) -> dict[str, Any]:
+        """What `add_mesh` is to colour the surface by when it is at `x`: displacement, or the body."""
+        if len(self.names) == 1:
+            return {"scalars": self.displacement(x), "clim": (0.0, self.largest), "cmap": COLOURS}
+        of_face = self.body[self.triangles[:, 0]]
+        return {"scalars": of_face, "clim": (-0.5, len(self.names) - 0.5), "cmap": ListedColormap(self.colours)}
 
     def displacement(self, x: FloatArray) -> FloatArray:
         """Distance of each node from its place at rest [m], shape (k,)."""
@@ -169,7 +196,7 @@ class _Grid:
         return _MARGIN + self.columns * (width + _MARGIN), self.rows * (height + _TITLE) + _BAR
 
 
-def _render(pyvista: ModuleType, surface: _Surface, camera: _Camera, grid: _Grid) -> list[Image]:
+def _render(pyvista: ModuleType, surface: _Surface, scenery: Scenery, camera: _Camera, grid: _Grid) -> list[Image]:
     """One image per frame, shape (height, width, 3)."""
     width, height = grid.cell
     plotter = pyvista.Plotter(
@@ -180,10 +207,9 @@ def _render(pyvista: ModuleType, surface: _Surface, camera: _Camera, grid: _Grid
         _aim(plotter, camera, height / grid.scale)
         _add_rest(plotter, pyvista, surface)
         images = []
-        for x in surface.deformed:
-            body = pyvista.PolyData.from_regular_faces(x, surface.triangles)
-            body["displacement"] = surface.displacement(x)
-            _add_body(plotter, body, surface)
+        for frame, x in enumerate(surface.deformed):
+            scenery.show(plotter, pyvista, frame, surface.everywhere, camera.direction)
+            _add_bodies(plotter, pyvista.PolyData.from_regular_faces(x, surface.triangles), surface, x)
             plotter.render()
             images.append(_average(np.asarray(plotter.screenshot(return_img=True))))
         return images
@@ -211,15 +237,13 @@ def _add_rest(plotter: Any, pyvista: ModuleType, surface: _Surface) -> None:
         plotter.add_mesh(rest, color=_REST, opacity=0.15, lighting=False)
 
 
-def _add_body(plotter: Any, body: Any, surface: _Surface) -> None:
-    """Show `body` in place of the one before."""
+def _add_bodies(plotter: Any, bodies: Any, surface: _Surface, x: FloatArray) -> None:
+    """Show `bodies` in place of those before."""
     plotter.add_mesh(
-        body,
-        name="body",
+        bodies,
+        name="bodies",
         reset_camera=False,
-        scalars="displacement",
-        clim=(0.0, surface.largest),
-        cmap=COLOURS,
+        **surface.scalars(x),
         show_scalar_bar=False,
         show_edges=len(surface.triangles) < 20_000,
         edge_color="#1f2933",
@@ -238,8 +262,8 @@ def _average(image: Image) -> Image:
     return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
 
 
-def _compose(images: Sequence[Image], frames: Sequence[Frame], largest: float, grid: _Grid) -> Figure:
-    """The images in a grid, each with its time, over one colour bar."""
+def _compose(images: Sequence[Image], frames: Sequence[Frame], surface: _Surface, grid: _Grid) -> Figure:
+    """The images in a grid, each with its time, over one colour bar or the names of the bodies."""
     width, height = grid.size
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
     titles = _time_texts([frame.time for frame in frames])
@@ -250,11 +274,22 @@ def _compose(images: Sequence[Image], frames: Sequence[Frame], largest: float, g
         figure.figimage(image, left, bottom)
         x, y = left + grid.cell[0] / 2, bottom + grid.cell[1] + _TITLE / 2
         figure.text(x / width, y / height, title, ha="center", va="center", fontsize=12)
+    if len(surface.names) > 1:
+        _add_names(figure, surface)
+        return figure
     bar = figure.add_axes((0.25, 46 / height, 0.5, 14 / height))
-    colours = ScalarMappable(Normalize(0, largest), COLOURS)
+    colours = ScalarMappable(Normalize(0, surface.largest), COLOURS)
     figure.colorbar(colours, cax=bar, orientation="horizontal")
     bar.set_xlabel("displacement [m]", labelpad=2)
     return figure
+
+
+def _add_names(figure: Figure, surface: _Surface, most: int = 8) -> None:
+    """The colour of each of the first bodies that has a name."""
+    named = [(name, colour) for name, colour in zip(surface.names, surface.colours, strict=True) if name][:most]
+    if named:
+        patches = [Patch(color=colour, label=name) for name, colour in named]
+        figure.legend(handles=patches, loc="lower center", ncols=len(patches))
 
 
 def _time_texts(times: Sequence[float]) -> list[str]:

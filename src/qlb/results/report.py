@@ -29,7 +29,7 @@ _TITLES = {
     "seconds": "Time",
 }
 _ALT = {
-    "picture": "The deformed body at chosen times, coloured by displacement",
+    "picture": "The deformed bodies at chosen times",
     "iterations": "Nonlinear iterations over time steps",
     "residuals": "Relative residual over nonlinear iterations, one line for each solve",
     "seconds": "Seconds by part of a step, in total and over time steps",

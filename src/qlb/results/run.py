@@ -19,6 +19,7 @@ from qlb.mesh import TetMesh
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
 from qlb.results.files import read_arrays
+from qlb.results.parts import Parts
 from qlb.results.statistics import Statistics, count_steps, read_statistics, summarise
 
 
@@ -30,9 +31,11 @@ class Frame:
     time: float
     """[s]"""
     positions: FloatArray
-    """[m], shape (n, 3)"""
+    """[m], shape (n, 3); with obstacles (n + q, 3), those of their vertices behind those of the bodies"""
     velocities: FloatArray
-    """[m/s], shape (n, 3)"""
+    """[m/s], of the same shape"""
+    plane_points: FloatArray
+    """a point on each plane [m], shape (p, 3)"""
 
 
 class StepIterations(NamedTuple):
@@ -72,9 +75,13 @@ class Run:
 
     @cached_property
     def mesh(self) -> TetMesh:
-        """The body at rest."""
-        arrays = read_arrays(self.directory / layout.MESH, {"positions": (None, 3), "tets": (None, 4)})
-        return TetMesh(arrays["positions"], arrays["tets"])
+        """The bodies at rest."""
+        return self.parts.mesh
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Bodies, obstacles and planes at rest, and which nodes belong to what."""
+        return Parts.read(self.directory / layout.MESH)
 
     @cached_property
     def stats(self) -> Statistics:
@@ -92,10 +99,13 @@ class Run:
         if not path.is_file():
             have = self.frame_steps
             raise InputError(f"run {self.directory} has no frame of step {step}, only {_some(have)}")
-        nodes = len(self.mesh.positions)
-        shapes = {"step": (), "time": (), "positions": (nodes, 3), "velocities": (nodes, 3)}
+        nodes, planes = self.parts.nodes, len(self.parts.planes)
+        shapes: dict[str, tuple[int | None, ...]] = {"step": (), "time": ()}
+        shapes |= {"positions": (nodes, 3), "velocities": (nodes, 3)}
+        shapes |= {"plane_points": (planes, 3)} if planes else {}
         arrays = read_arrays(path, shapes)
-        return Frame(int(arrays["step"]), float(arrays["time"]), arrays["positions"], arrays["velocities"])
+        points = arrays["plane_points"] if planes else np.empty((0, 3))
+        return Frame(int(arrays["step"]), float(arrays["time"]), arrays["positions"], arrays["velocities"], points)
 
     def frames(self) -> Iterator[Frame]:
         """Every frame in order, read one by one."""
@@ -123,7 +133,7 @@ class Run:
 
     def load_checkpoint(self) -> tuple[State, int, dict[str, FloatArray]]:
         """State, steps done and solver arrays of the last checkpoint: the arguments of `Simulation.restore`."""
-        checkpoint = Checkpoint.read(self.directory / layout.CHECKPOINT, len(self.mesh.positions))
+        checkpoint = Checkpoint.read(self.directory / layout.CHECKPOINT, self.parts.nodes)
         return checkpoint.state, checkpoint.steps_done, checkpoint.solver
 
 

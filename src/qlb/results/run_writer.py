@@ -21,6 +21,7 @@ from qlb.results.checkpoint import Checkpoint
 from qlb.results.clock import LoopClock
 from qlb.results.errors import WriteError
 from qlb.results.files import append_text, write_arrays, write_text
+from qlb.results.parts import Parts
 from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
 from qlb.simulation import Simulation, StepFailed, StepResult
 
@@ -73,8 +74,7 @@ class RunWriter:
         self._finished = False
         layout.claim(self.directory, overwrite=overwrite)
         write_text(self.directory / layout.SCENE, text)
-        mesh = simulation.mesh
-        write_arrays(self.directory / layout.MESH, {"positions": mesh.positions, "tets": mesh.tets})
+        write_arrays(self.directory / layout.MESH, Parts.of(simulation.assembly).arrays())
         append_text(self.directory / layout.STATS, HEADER)
         self._keep()
         self._clock = LoopClock(simulation.timer)
@@ -148,6 +148,8 @@ class RunWriter:
         """Write the frame, then the checkpoint that makes it count."""
         state, step = self._now.state, self._now.steps_done
         frame = {"positions": state.positions, "velocities": state.velocities}
+        if planes := self._simulation.assembly.planes:
+            frame["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
         write_arrays(
             layout.frame_path(self.directory, step), {"step": np.int64(step), "time": np.float64(state.time), **frame}
         )
