@@ -36,6 +36,7 @@ void bind_contact_set(nb::module_& m) {
   property(set, "distance", &ContactSet::distance);
   property(set, "force", &ContactSet::force);
   property(set, "stiffness", &ContactSet::stiffness);
+  property(set, "dhat", &ContactSet::dhat);
   property(set, "key", &ContactSet::key);
   property(set, "groups", &ContactSet::groups);
 }
@@ -69,6 +70,12 @@ void bind_potential(nb::module_& m) {
           [](Barrier* self, std::shared_ptr<ContactSurface> surface, double dhat, double stiffness, int threads,
              const std::string& kind) { new (self) Barrier(std::move(surface), dhat, stiffness, threads, kind); },
           nb::arg("surface"), nb::arg("dhat"), nb::arg("stiffness"), nb::arg("threads"), nb::arg("kind") = "barrier")
+      .def(
+          "limit_pairs",
+          [](Barrier& b, const Array<const std::int64_t>& keys, const Array<const double>& dhat) {
+            b.limit_pairs(view(keys), view(dhat));
+          },
+          nb::arg("keys"), nb::arg("dhat"), "Pairs that act only when nearer than a distance of their own.")
       .def("evaluate", &evaluate, nb::arg("x"), nb::arg("vertex_faces"), nb::arg("edge_edges"), nb::arg("planes"),
            nb::arg("plane_allowed"), nb::arg("scale"), nb::arg("gradient").noconvert(),
            nb::arg("edge_sign") = nb::none(), ReleaseGil(),

@@ -54,7 +54,7 @@ struct Barrier::Contact {
   std::int64_t key;
   std::array<std::int32_t, 4> nodes;
   std::array<std::int32_t, 2> groups;
-  double weight, threshold = 0.0;
+  double weight, dhat = 0.0, threshold = 0.0;
   std::int8_t sign = 1;
   std::array<double, 4> gamma{};
   Vec3 normal;
@@ -85,6 +85,7 @@ struct Barrier::Contact {
     set.key.push_back(key);
     set.groups.push_back(groups);
     set.weight.push_back(weight);
+    set.dhat.push_back(dhat);
     set.mollifier_threshold.push_back(threshold);
     set.sign.push_back(sign);
     set.energy += energy;
@@ -109,7 +110,7 @@ Barrier::Barrier(std::shared_ptr<const ContactSurface> surface, double dhat, dou
     if (count >> kKeyBits != 0) throw std::invalid_argument("the surface has more than 2^30 primitives of a kind");
 }
 
-void Barrier::check(const Candidates& candidates, const Planes& planes) const {
+void Barrier::check(const CandidatePairs& candidates, const Planes& planes) const {
   const auto edges = static_cast<std::int64_t>(surface_->edges().size());
   check_pairs(candidates.vertex_faces, surface_->nodes(), static_cast<std::int64_t>(surface_->faces().size()),
               "vertex_faces");
@@ -129,20 +130,37 @@ Separation Barrier::separation(ContactKind kind, const std::array<Vec3, 4>& x, d
   return penalty_ ? signed_separation(kind, x, sign) : unsigned_separation(kind, x);
 }
 
-Derivatives Barrier::potential(double distance, double weight) const {
-  const double s = distance / dhat_, unit = weight * stiffness_;
+Derivatives Barrier::potential(double distance, double weight, double dhat) const {
+  const double s = distance / dhat, unit = weight * stiffness_;
   const Derivatives f = penalty_ ? quadratic_penalty(s) : log_barrier(s);
-  return {unit * dhat_ * f.value, unit * f.first, unit / dhat_ * f.second};
+  return {unit * dhat * f.value, unit * f.first, unit / dhat * f.second};
+}
+
+void Barrier::limit_pairs(std::span<const std::int64_t> keys, std::span<const double> dhat) {
+  if (keys.size() != dhat.size()) throw std::invalid_argument("keys and dhat have different lengths");
+  limited_.clear();
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    if (!(dhat[k] > 0.0)) throw std::invalid_argument("dhat of a pair must be positive");
+    limited_.emplace_back(keys[k], std::min(dhat[k], dhat_));
+  }
+  std::ranges::sort(limited_);
+}
+
+double Barrier::dhat_of(std::int64_t key) const {
+  const auto found = std::ranges::lower_bound(limited_, key, {}, &std::pair<std::int64_t, double>::first);
+  return found != limited_.end() && found->first == key ? found->second : dhat_;
 }
 
 // Keeps the contact, filled in with what depends on the positions `at`, if the two are in reach of each other.
 void Barrier::keep_near(const std::array<Vec3, 4>& at, Contact&& c, std::vector<Contact>& found) const {
   const Separation s = separation(c.kind, at, c.sign);
-  if (!in_reach(s.distance)) return;
+  if (!in_reach(s.distance, dhat_)) return;
+  c.dhat = c.groups[0] == c.groups[1] ? dhat_of(c.key) : dhat_;
+  if (!in_reach(s.distance, c.dhat)) return;
   c.gamma = s.closest.gamma;
   c.normal = s.normal;
   c.distance = s.distance;
-  c.evaluate(potential(s.distance, c.weight),
+  c.evaluate(potential(s.distance, c.weight, c.dhat),
              c.kind == ContactKind::edge_edge ? edge_mollifier(at, c.threshold) : Mollifier{});
   found.push_back(c);
 }
@@ -195,15 +213,16 @@ void Barrier::vertex_planes(const double* x, std::int32_t node, const Planes& pl
                     .nodes = {node, node, node, node},
                     .groups = {group, groups + q},
                     .weight = scale * surface_->node_area(node),
+                    .dhat = dhat_,
                     .gamma = {1.0, 0.0, 0.0, 0.0},
                     .normal = normal,
                     .distance = distance};
-    contact.evaluate(potential(distance, contact.weight), Mollifier{});
+    contact.evaluate(potential(distance, contact.weight, dhat_), Mollifier{});
     found.push_back(contact);
   }
 }
 
-ContactSet Barrier::evaluate(const double* x, const Candidates& candidates, const Planes& planes, double scale,
+ContactSet Barrier::evaluate(const double* x, const CandidatePairs& candidates, const Planes& planes, double scale,
                              double* gradient) const {
   check(candidates, planes);
   const std::vector<std::int32_t>& vertices = surface_->vertices();
@@ -244,7 +263,9 @@ void Barrier::hessian_blocks(const double* x, const ContactSet& contacts, bool p
     }
     const std::array<Vec3, 4> at = positions(x, contacts.nodes[k]);
     const Separation s = separation(kind, at, contacts.sign[k]);
-    const Derivatives f = in_reach(s.distance) ? potential(s.distance, contacts.weight[k]) : Derivatives{};
+    const double dhat = contacts.dhat[k];
+    const bool near = in_reach(s.distance, dhat);
+    const Derivatives f = near ? potential(s.distance, contacts.weight[k], dhat) : Derivatives{};
     const bool edges = kind == ContactKind::edge_edge;
     pair_hessian(at, s, f, edges ? edge_mollifier(at, contacts.mollifier_threshold[k]) : Mollifier{}, project, block);
   }

@@ -7,6 +7,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "contact/contact_set.hpp"
 #include "contact/potentials.hpp"
@@ -16,7 +18,7 @@
 namespace qlb {
 
 // Pairs that may be in contact. Those of faces are (node, face), those of edges (edge, edge).
-struct Candidates {
+struct CandidatePairs {
   std::span<const std::int32_t> vertex_faces, edge_edges;
   std::span<const std::int8_t> edge_sign;  // one per pair of edges, or none: all 1
 };
@@ -35,8 +37,12 @@ class Barrier {
   Barrier(std::shared_ptr<const ContactSurface> surface, double dhat, double stiffness, int threads,
           const std::string& kind);
 
+  // Pairs that act only when nearer than a distance of their own below dhat: parts of one body that are near each other
+  // at rest. Keys as in ContactSet.
+  void limit_pairs(std::span<const std::int64_t> keys, std::span<const double> dhat);
+
   // Adds scale times the gradient of the energy to `gradient` (nodes, 3).
-  ContactSet evaluate(const double* x, const Candidates& candidates, const Planes& planes, double scale,
+  ContactSet evaluate(const double* x, const CandidatePairs& candidates, const Planes& planes, double scale,
                       double* gradient) const;
 
   // The Hessian of each contact's energy, scaled as in `contacts`: blocks (size, 12, 12), row 3i + c for component c of
@@ -47,10 +53,11 @@ class Barrier {
 
  private:
   struct Contact;
-  void check(const Candidates& candidates, const Planes& planes) const;
+  void check(const CandidatePairs& candidates, const Planes& planes) const;
   Separation separation(ContactKind kind, const std::array<Vec3, 4>& x, double sign) const;
-  bool in_reach(double distance) const { return distance < dhat_ && (!penalty_ || distance > -reach_); }
-  Derivatives potential(double distance, double weight) const;
+  bool in_reach(double distance, double dhat) const { return distance < dhat && (!penalty_ || distance > -reach_); }
+  Derivatives potential(double distance, double weight, double dhat) const;
+  double dhat_of(std::int64_t key) const;
   void keep_near(const std::array<Vec3, 4>& at, Contact&& contact, std::vector<Contact>& found) const;
   void vertex_face(const double* x, const std::int32_t* candidate, double scale, std::vector<Contact>& found) const;
   void edge_edge(const double* x, const std::int32_t* candidate, std::int8_t sign, double scale,
@@ -60,6 +67,7 @@ class Barrier {
 
   std::shared_ptr<const ContactSurface> surface_;
   double dhat_, stiffness_;
+  std::vector<std::pair<std::int64_t, double>> limited_;  // key and dhat, ascending
   int threads_;
   bool penalty_;
   double reach_;  // a pair farther apart is no contact; nor is one that much inside

@@ -25,6 +25,7 @@ struct ContactSet {
   std::vector<double> force, stiffness;  // -scale dE/dd >= 0 and scale d2E/dd2 >= 0
   std::vector<std::int64_t> key;         // one per pair of primitives, the same in every configuration
   std::vector<std::array<std::int32_t, 2>> groups;
+  std::vector<double> dhat;                 // distance below which it acts [m]
   std::vector<double> weight;               // scale times the area [m^2]
   std::vector<double> mollifier_threshold;  // eps [m^4] of two edges, else 0
   std::vector<std::int8_t> sign;            // of the distance of two edges, else 1

@@ -66,13 +66,15 @@ class ContactModel:
         self.surface = _native.ContactSurface(around.rest, around.faces, around.groups, allowed)
         self.candidates = _native.Candidates(self.surface, around.threads)
         self.normals: FloatArray = np.array([plane.normal for plane in around.planes]).reshape(-1, 3)
-        self.dhat = self._resolve_dhat()
+        self.dhat = settings.dhat or self._default_dhat()
         self.stiffness = settings.stiffness or around.young
         self.barrier = _native.Barrier(self.surface, self.dhat, self.stiffness, around.threads, settings.mode)
         vertices = self.surface.vertices
         self.vertices: IntArray = vertices[around.groups[vertices] < around.bodies]
         """surface nodes of bodies"""
         self._near_planes = self.plane_allowed[:, around.groups[self.vertices]].T != 0
+        if self.is_barrier:
+            self._limit_features()
 
     @property
     def is_barrier(self) -> bool:
@@ -83,6 +85,14 @@ class ContactModel:
     def has_friction(self) -> bool:
         """Whether anything slides with friction."""
         return bool(self.friction.any())
+
+    def evaluate(
+        self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray
+    ) -> _native.ContactSet:
+        """The contacts at `x` (n, 3) [m] among the candidates; `scale` dPhi/dx is added to `gradient` (n, 3)."""
+        planes = np.column_stack([self.normals, offsets])
+        pairs = self.candidates.vertex_faces, self.candidates.edge_edges
+        return self.barrier.evaluate(x, *pairs, planes, self.plane_allowed, scale, gradient)
 
     def offsets(self, time: float) -> FloatArray:
         """Of the planes at `time` [s]: n.x = offset on each, shape (q,) [m]."""
@@ -121,40 +131,35 @@ class ContactModel:
         if found is not None:
             raise InputError(f"the start state intersects: {found}; move bodies or obstacles apart")
 
-    def _resolve_dhat(self) -> float:
-        """The distance that was set, with a warning where it is larger than a feature; else the default."""
+    def _default_dhat(self) -> float:
+        """A tenth of the mean edge of the bodies' surfaces."""
         edges, groups = self.surface.edges, self.around.groups
         lengths = np.linalg.norm(self.around.rest[edges[:, 0]] - self.around.rest[edges[:, 1]], axis=1)
-        mean = float(lengths[groups[edges[:, 0]] < self.around.bodies].mean())
-        wanted = self.settings.dhat or DHAT_OF_EDGE * mean
-        gap, body = self._smallest_rest_gap(wanted)
-        if gap >= wanted:
-            return wanted
-        if self.settings.dhat is None:
-            return 0.5 * gap
-        warnings.warn(
-            f"contact.dhat = {wanted:.4g} m is larger than a feature of {body}: parts of it that are {gap:.4g} m apart"
-            f" at rest push each other; below {gap:.4g} m nothing is prestressed",
-            QlbWarning,
-            stacklevel=2,
-        )
-        return wanted
+        return DHAT_OF_EDGE * float(lengths[groups[edges[:, 0]] < self.around.bodies].mean())
 
-    def _smallest_rest_gap(self, within: float) -> tuple[float, str]:
-        """The smallest distance between parts of one body at rest that do not meet, up to `within` [m]; the body."""
-        smallest, body = np.inf, ""
-        rest, faces, groups = self.around.rest, self.around.faces, self.around.groups
-        still = np.zeros_like(rest)
-        for b in range(self.around.bodies) if self.settings.self_contact else ():
-            own = np.ascontiguousarray(faces[groups[faces[:, 0]] == b])
-            alone = np.zeros((groups.max() + 1,) * 2, dtype=np.uint8)
-            alone[b, b] = 1
-            search = _native.Candidates(_native.ContactSurface(rest, own, groups, alone), self.around.threads)
-            search.build(rest, still, 0.0, within)
-            gap = search.minimum_distance(rest)
-            if gap < smallest:
-                smallest, body = gap, self.around.names[b]
-        return smallest, body
+    def _limit_features(self) -> None:
+        """Let parts of one body that are nearer than dhat at rest act from half that distance on.
+
+        Else a body would be strained by itself at rest. Warns where dhat was set by the user.
+        """
+        rest, groups = self.around.rest, self.around.groups
+        self.candidates.build(rest, np.zeros_like(rest), 0.0, self.dhat)
+        far_away = np.full(len(self.normals), -np.inf)
+        near = self.evaluate(rest, far_away, 1.0, np.zeros_like(rest))
+        own = near.groups[:, 0] == near.groups[:, 1]
+        if not own.any():
+            return
+        self.barrier.limit_pairs(near.key[own], 0.5 * near.distance[own])
+        if self.settings.dhat is not None:
+            k = int(np.flatnonzero(own)[np.argmin(near.distance[own])])
+            nodes = ", ".join(self.describe(int(node)) for node in dict.fromkeys(near.nodes[k]))
+            warnings.warn(
+                f"contact.dhat = {self.dhat:.4g} m is larger than features of the bodies: {own.sum()} pairs are nearer"
+                f" at rest, down to {near.distance[k]:.4g} m ({nodes}); such pairs act from half their distance at"
+                " rest on",
+                QlbWarning,
+                stacklevel=2,
+            )
 
 
 def _tables(settings: Contact, around: Surroundings) -> tuple[FloatArray, np.ndarray]:

@@ -38,9 +38,9 @@ class Contact(Settings):
     )
     dhat: float | None = quantity(
         None,
-        "Distance at which contact begins to act; by default a tenth of the mean edge of the bodies' surfaces, and no"
-        " more than half the smallest gap within a body at rest. Smaller is closer to hard contact, and takes more"
-        " iterations",
+        "Distance at which contact begins to act; by default a tenth of the mean edge of the bodies' surfaces. Smaller"
+        " is closer to hard contact, and takes more iterations. Parts of one body that are nearer to each other at rest"
+        " act from half their distance at rest on",
         unit="m",
         gt=0,
     )

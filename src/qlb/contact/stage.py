@@ -109,17 +109,7 @@ class StageContact:
         self.cover(x, None)
         with self._timer.section("contact"):
             gradient = np.zeros_like(x)
-            planes = np.column_stack([model.normals, self._offsets])
-            candidates = model.candidates
-            contacts = model.barrier.evaluate(
-                x,
-                candidates.vertex_faces,
-                candidates.edge_edges,
-                planes,
-                model.plane_allowed,
-                self._scale,
-                gradient,
-            )
+            contacts = model.evaluate(x, self._offsets, self._scale, gradient)
             if self._friction is None:
                 return ContactPoint(contacts.energy, gradient, contacts)
             epsilon = model.friction_velocity * self._stage.c
