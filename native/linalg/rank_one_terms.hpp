@@ -26,8 +26,8 @@ class RankOneTerms {
   // Throws std::invalid_argument where a term has a node outside [0, nodes).
   void check_nodes(std::int64_t nodes) const;
 
-  double dot(std::int64_t j, const double* v) const;                 // a_j . v, v (nodes, 3)
-  void add(std::int64_t j, double scale, double* out) const;         // out += scale a_j
+  double dot(std::int64_t j, const double* v) const;                   // a_j . v, v (nodes, 3)
+  void add(std::int64_t j, double scale, double* out) const;           // out += scale a_j
   void add_product(const double* v, double* out, double scale) const;  // out += scale C K C^T v
 
  private:

@@ -201,7 +201,9 @@ def test_tiny_and_huge_stiffness(precision: str, factor: float) -> None:
     terms = body.terms(60, scale)
     assert body.inverse.set_terms(terms.native)
     found, expected = dense_inverse(body), body.expected(body.terms(60, np.minimum(scale, 1e7)))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=(1e-6 if precision == "float64" else 1e-3) * expected.max())
+    np.testing.assert_allclose(
+        found, expected, rtol=0, atol=(1e-6 if precision == "float64" else 1e-3) * expected.max()
+    )
 
 
 def test_equal_terms_count_twice(precision: str) -> None:
