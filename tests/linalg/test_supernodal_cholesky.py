@@ -390,6 +390,6 @@ def test_an_extended_pattern_reuses_the_order(rng: np.random.Generator) -> None:
 def test_an_order_that_is_none_is_refused(order: list[int]) -> None:
     pattern, _ = hessian(MESHES["one tet"]())
     message = "order has 3 nodes, expected all 4" if len(order) == 3 else r"order holds node -?\d twice or outside"
+    given = np.array(order, dtype=np.int32)
     with pytest.raises(ValueError, match=message):
-        given = np.array(order, dtype=np.int32)
         _native.SupernodalCholesky(pattern, np.zeros((4, 3), dtype=np.uint8), 1, "float64", order=given)
