@@ -46,16 +46,19 @@ void gram3(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int6
 // t (3) += A^T y.
 template <class V, class T>
 void dots3(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t) {
-  const T *a0 = a, *a1 = a + lda, *a2 = a + 2 * lda;
-  double t0 = 0.0, t1 = 0.0, t2 = 0.0;
-#pragma omp simd reduction(+ : t0, t1, t2)
-  for (std::int64_t i = 0; i < rows; ++i) {
-    const double w = y[i];
-    t0 += static_cast<double>(a0[i]) * w;
-    t1 += static_cast<double>(a1[i]) * w;
-    t2 += static_cast<double>(a2[i]) * w;
+  using D = xsimd::batch<double, typename V::arch_type>;
+  D sum[3] = {D(0.0), D(0.0), D(0.0)};
+  std::int64_t i = 0;
+  for (; i + kLanes<D> <= rows; i += kLanes<D>) {
+    const D side = load_doubles<D>(y + i);
+#pragma GCC unroll 3
+    for (int c = 0; c < 3; ++c) sum[c] = xsimd::fma(load_doubles<D>(a + i + c * lda), side, sum[c]);
   }
-  t[0] += t0, t[1] += t1, t[2] += t2;
+  for (int c = 0; c < 3; ++c) {
+    double rest = 0.0;
+    for (std::int64_t k = i; k < rows; ++k) rest += static_cast<double>(a[k + c * lda]) * y[k];
+    t[c] += sum_of_lanes<D, double>(sum[c]) + rest;
+  }
 }
 
 // y -= A c.

@@ -85,7 +85,7 @@ class Body:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        return self.fixed.ravel() == 0
+        return np.asarray(self.fixed.ravel() == 0)
 
     def maps(self) -> Array:
         """T as a dense matrix, with identities where an axis is held."""
@@ -346,6 +346,8 @@ def test_product_with_terms_is_that_of_the_dense_matrix(rng: np.random.Generator
     expected = out.ravel() - 0.7 * terms.dense(9) @ v.ravel()
     native = terms.native
     assert native.size == len(native) == 30
+    for name, part in vars(terms).items():
+        np.testing.assert_array_equal(getattr(native, name), part)
     native.add_product(v, out, -0.7)
     np.testing.assert_allclose(out.ravel(), expected, rtol=0, atol=1e-12)
 
