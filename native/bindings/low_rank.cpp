@@ -6,7 +6,14 @@
 namespace qlb {
 namespace {
 
+template <class T, std::size_t width>
+auto rows(const std::vector<std::array<T, width>>& values) {
+  return nb::ndarray<nb::numpy, const T, nb::shape<-1, width>>(values.empty() ? nullptr : values[0].data(),
+                                                               {values.size(), width});
+}
+
 void bind_terms(nb::module_& m) {
+  constexpr auto inside = nb::rv_policy::reference_internal;
   nb::class_<RankOneTerms>(m, "RankOneTerms",
                            "A sum of matrices stiffness a a^T, a = gamma (x) axis at the nodes of each term.")
       .def(
@@ -18,6 +25,19 @@ void bind_terms(nb::module_& m) {
           nb::arg("nodes"), nb::arg("gamma"), nb::arg("axis"), nb::arg("stiffness"),
           "Shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.")
       .def_prop_ro("size", &RankOneTerms::size)
+      .def_prop_ro(
+          "nodes", [](const RankOneTerms& terms) { return rows(terms.all_nodes()); }, inside)
+      .def_prop_ro(
+          "gamma", [](const RankOneTerms& terms) { return rows(terms.all_gamma()); }, inside)
+      .def_prop_ro(
+          "axis", [](const RankOneTerms& terms) { return rows(terms.all_axes()); }, inside)
+      .def_prop_ro(
+          "stiffness",
+          [](const RankOneTerms& terms) {
+            const std::vector<double>& k = terms.all_stiffness();
+            return nb::ndarray<nb::numpy, const double, nb::ndim<1>>(k.data(), {k.size()});
+          },
+          inside)
       .def("__len__", &RankOneTerms::size)
       .def(
           "add_product",

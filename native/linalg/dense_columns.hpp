@@ -1,40 +1,64 @@
 // Products of a node's three columns (NodeColumns). Products of floats are summed in double.
 #pragma once
 
-#include "linalg/tile.hpp"
+#include "linalg/dense_solve.hpp"
 
 namespace qlb::dense {
 
-// g (3 x 3, row by row) = A^T B, A and B (rows x 3).
+// As many doubles as one of V's vectors of doubles holds, from floats or doubles.
+template <class D>
+inline D load_doubles(const double* from) {
+  return D::load_unaligned(from);
+}
+template <class D>
+inline D load_doubles(const float* from) {
+#if defined(__AVX512F__)
+  return D(_mm512_cvtps_pd(_mm256_loadu_ps(from)));
+#elif defined(__AVX2__)
+  return D(_mm256_cvtps_pd(_mm_loadu_ps(from)));
+#else
+  alignas(64) double buffer[kLanes<D>];
+  for (int k = 0; k < kLanes<D>; ++k) buffer[k] = from[k];
+  return D::load_aligned(buffer);
+#endif
+}
+
+// g (3 x 3, row by row) = A^T B, A and B (rows x 3), with kPadding zeros below each column.
 template <class V, class T>
 void gram3(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g) {
-  const T *a0 = a, *a1 = a + lda, *a2 = a + 2 * lda;
-  for (int d = 0; d < 3; ++d, b += ldb) {
-    double g0 = 0.0, g1 = 0.0, g2 = 0.0;
-#pragma omp simd reduction(+ : g0, g1, g2)
-    for (std::int64_t i = 0; i < rows; ++i) {
-      const double w = b[i];
-      g0 += static_cast<double>(a0[i]) * w;
-      g1 += static_cast<double>(a1[i]) * w;
-      g2 += static_cast<double>(a2[i]) * w;
+  using D = xsimd::batch<double, typename V::arch_type>;
+  D sum[3][3];
+#pragma GCC unroll 9
+  for (int k = 0; k < 9; ++k) sum[k / 3][k % 3] = D(0.0);
+  for (std::int64_t i = 0; i < rows; i += kLanes<D>) {
+    const D x[3] = {load_doubles<D>(a + i), load_doubles<D>(a + i + lda), load_doubles<D>(a + i + 2 * lda)};
+#pragma GCC unroll 3
+    for (int d = 0; d < 3; ++d) {
+      const D y = load_doubles<D>(b + i + d * ldb);
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) sum[c][d] = xsimd::fma(x[c], y, sum[c][d]);
     }
-    g[d] = g0, g[3 + d] = g1, g[6 + d] = g2;
   }
+#pragma GCC unroll 9
+  for (int k = 0; k < 9; ++k) g[k] = sum_of_lanes<D, double>(sum[k / 3][k % 3]);
 }
 
 // t (3) += A^T y.
 template <class V, class T>
 void dots3(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t) {
-  const T *a0 = a, *a1 = a + lda, *a2 = a + 2 * lda;
-  double t0 = 0.0, t1 = 0.0, t2 = 0.0;
-#pragma omp simd reduction(+ : t0, t1, t2)
-  for (std::int64_t i = 0; i < rows; ++i) {
-    const double w = y[i];
-    t0 += static_cast<double>(a0[i]) * w;
-    t1 += static_cast<double>(a1[i]) * w;
-    t2 += static_cast<double>(a2[i]) * w;
+  using D = xsimd::batch<double, typename V::arch_type>;
+  D sum[3] = {D(0.0), D(0.0), D(0.0)};
+  std::int64_t i = 0;
+  for (; i + kLanes<D> <= rows; i += kLanes<D>) {
+    const D side = load_doubles<D>(y + i);
+#pragma GCC unroll 3
+    for (int c = 0; c < 3; ++c) sum[c] = xsimd::fma(load_doubles<D>(a + i + c * lda), side, sum[c]);
   }
-  t[0] += t0, t[1] += t1, t[2] += t2;
+  for (int c = 0; c < 3; ++c) {
+    double rest = 0.0;
+    for (std::int64_t k = i; k < rows; ++k) rest += static_cast<double>(a[k + c * lda]) * y[k];
+    t[c] += sum_of_lanes<D, double>(sum[c]) + rest;
+  }
 }
 
 // y -= A c.

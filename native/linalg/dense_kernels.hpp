@@ -50,7 +50,8 @@ struct DenseKernels {
   void (*backward_own)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, T* x, std::int64_t ldx,
                        int sides);
 
-  // Of three columns each, `lda` or `ldb` apart: g (3 x 3, row by row) = A^T B; t (3) += A^T y; y -= A c.
+  // Of three columns each, `lda` or `ldb` apart: g (3 x 3, row by row) = A^T B, with
+  // kPadding zeros below each column; t (3) += A^T y; y -= A c.
   void (*gram3)(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g);
   void (*dots3)(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t);
   void (*subtract3)(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t rows);

@@ -34,8 +34,8 @@ class Lbfgs {
   std::int64_t slot(int k) const { return (first_ + k) % (window_ + 1); }
 
   void take_terms(const RankOneTerms& terms);
-  double dot_y(int k, const RankOneTerms& terms, const double* v);                // y' . v
-  void add_y(int k, const RankOneTerms& terms, double scale, double* v);          // v += scale y'
+  double dot_y(int k, const RankOneTerms& terms, const double* v);        // y' . v
+  void add_y(int k, const RankOneTerms& terms, double scale, double* v);  // v += scale y'
 
   std::int64_t size_;
   int window_, threads_;

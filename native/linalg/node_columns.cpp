@@ -8,7 +8,7 @@
 
 namespace qlb {
 namespace {
-constexpr std::int64_t kRowsPerTask = 1024;
+constexpr std::int64_t kRowsPerTask = 1024, kColumnsPerTask = 8;
 constexpr double kNotMade = std::numeric_limits<double>::quiet_NaN();
 }  // namespace
 
@@ -70,7 +70,7 @@ auto NodeColumns<T>::add_columns(std::span<const std::int32_t> nodes) -> std::ve
       }
     const std::int32_t s = owner_[first];
     const std::int64_t rows = rows_to_root_[s] - (first - supernodes_.first[s]);
-    const std::int64_t ld = (rows + kPadding - 1) / kPadding * kPadding;
+    const std::int64_t ld = (rows + 2 * kPadding - 1) / kPadding * kPadding;
     columns_.push_back({s, first, rows, ld, Aligned<T>(3 * ld, T(0))});
     joined_.push_back(0);
   }
@@ -111,14 +111,12 @@ void NodeColumns<T>::make(std::span<const std::int32_t> nodes) {
   const std::vector<Side> sides = add_columns(nodes);
   const auto batches = (static_cast<std::int64_t>(sides.size()) + kRightSides - 1) / kRightSides;
   if (batches == 0) return;
-#pragma omp parallel num_threads(threads_) if (batches > 1 && threads_ > 1)
-  {
-    typename SupernodalFactor<T>::PathWork work(factor_);
-#pragma omp for schedule(dynamic, 1)
-    for (std::int64_t k = 0; k < batches; ++k) {
-      const std::size_t begin = k * kRightSides;
-      solve_sides(std::span(sides).subspan(begin, std::min<std::size_t>(kRightSides, sides.size() - begin)), work);
-    }
+  while (static_cast<int>(work_.size()) < threads_) work_.emplace_back(factor_);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_) if (batches > 1 && threads_ > 1)
+  for (std::int64_t k = 0; k < batches; ++k) {
+    const std::size_t begin = k * kRightSides;
+    solve_sides(std::span(sides).subspan(begin, std::min<std::size_t>(kRightSides, sides.size() - begin)),
+                work_[omp_get_thread_num()]);
   }
 }
 
@@ -160,16 +158,19 @@ template <class T>
 void NodeColumns<T>::join(std::span<const std::int32_t> columns) {
   reserve_gram();
   std::vector<std::int32_t> ids(columns.begin(), columns.end());
-  std::sort(ids.begin(), ids.end(), [&](std::int32_t a, std::int32_t b) {
-    return joined_[a] != joined_[b] ? joined_[a] > joined_[b] : a < b;
-  });
+  std::sort(ids.begin(), ids.end(),
+            [&](std::int32_t a, std::int32_t b) { return joined_[a] != joined_[b] ? joined_[a] > joined_[b] : a < b; });
   const auto count = static_cast<std::int64_t>(ids.size());
   const std::int64_t known =
       std::find_if(ids.begin(), ids.end(), [&](std::int32_t k) { return !joined_[k]; }) - ids.begin();
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads_) if (threads_ > 1)
-  for (std::int64_t a = known; a < count; ++a)
-    for (std::int64_t b = 0; b <= a; ++b)
-      if (std::isnan(*(gram_row(ids[a], 0) + 3 * std::int64_t{ids[b]}))) make_gram(ids[a], ids[b]);
+  // A few columns stay in the cache while the others pass by.
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads_) if (threads_ > 1)
+  for (std::int64_t first = known; first < count; first += kColumnsPerTask) {
+    const std::int64_t last = std::min(count, first + kColumnsPerTask);
+    for (std::int64_t b = 0; b < last; ++b)
+      for (std::int64_t a = std::max(first, b); a < last; ++a)
+        if (std::isnan(*(gram_row(ids[a], 0) + 3 * std::int64_t{ids[b]}))) make_gram(ids[a], ids[b]);
+  }
   std::fill(joined_.begin(), joined_.end(), 0);
   for (const std::int32_t k : ids) joined_[k] = 1;
 }

@@ -32,11 +32,13 @@ class NodeColumns {
   std::int64_t count() const { return static_cast<std::int64_t>(columns_.size()); }
   std::int64_t bytes() const;
   // Row d of the blocks G_ij, j = 0, 1, ...: 3 count() entries.
-  const double* gram_row(std::int32_t i, int d) const { return gram_.data() + (3 * std::int64_t{i} + d) * 3 * capacity_; }
+  const double* gram_row(std::int32_t i, int d) const {
+    return gram_.data() + (3 * std::int64_t{i} + d) * 3 * capacity_;
+  }
 
-  void dots(std::span<const std::int32_t> columns, const T* y, double* t) const;            // t_k = Z^T y, each 3
-  void subtract(std::span<const std::int32_t> columns, const double* c, T* y) const;        // y -= sum_k Z c_k
-  
+  void dots(std::span<const std::int32_t> columns, const T* y, double* t) const;      // t_k = Z^T y, each 3
+  void subtract(std::span<const std::int32_t> columns, const double* c, T* y) const;  // y -= sum_k Z c_k
+
  private:
   struct Column {
     std::int32_t supernode;
@@ -66,7 +68,8 @@ class NodeColumns {
   std::vector<std::int64_t> rows_to_root_;  // of each supernode and its ancestors
   std::vector<std::int32_t> column_of_node_;
   std::vector<Column> columns_;
-  std::vector<std::uint8_t> joined_;  // columns whose blocks among themselves are there
+  std::vector<std::uint8_t> joined_;                          // columns whose blocks among themselves are there
+  std::vector<typename SupernodalFactor<T>::PathWork> work_;  // of each thread
   std::int64_t capacity_ = 0;
   Aligned<double> gram_;  // (3 capacity, 3 capacity), symmetric; NaN where not made
 };

@@ -22,12 +22,16 @@ class RankOneTerms {
   const std::array<double, 4>& gamma(std::int64_t j) const { return gamma_[j]; }
   const std::array<double, 3>& axis(std::int64_t j) const { return axis_[j]; }
   double stiffness(std::int64_t j) const { return stiffness_[j]; }
+  const std::vector<std::array<std::int32_t, 4>>& all_nodes() const { return nodes_; }
+  const std::vector<std::array<double, 4>>& all_gamma() const { return gamma_; }
+  const std::vector<std::array<double, 3>>& all_axes() const { return axis_; }
+  const std::vector<double>& all_stiffness() const { return stiffness_; }
 
   // Throws std::invalid_argument where a term has a node outside [0, nodes).
   void check_nodes(std::int64_t nodes) const;
 
-  double dot(std::int64_t j, const double* v) const;                 // a_j . v, v (nodes, 3)
-  void add(std::int64_t j, double scale, double* out) const;         // out += scale a_j
+  double dot(std::int64_t j, const double* v) const;                   // a_j . v, v (nodes, 3)
+  void add(std::int64_t j, double scale, double* out) const;           // out += scale a_j
   void add_product(const double* v, double* out, double scale) const;  // out += scale C K C^T v
 
  private:

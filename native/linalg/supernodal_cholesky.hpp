@@ -66,7 +66,7 @@ class SupernodalCholesky : public Cholesky {
   }
 
   std::span<const std::int32_t> node_order() const { return node_order_; }  // all nodes; those wholly held come last
-  std::span<const std::int64_t> order() const { return supernodes_.dof; }  // degree of freedom of each row
+  std::span<const std::int64_t> order() const { return supernodes_.dof; }   // degree of freedom of each row
   std::int64_t factor_nonzeros() const override { return nonzeros_; }
   double factor_flops() const override { return flops_; }
   std::int64_t bytes() const;                                                 // that L takes

@@ -64,7 +64,8 @@ bool WoodburyInverse::set_terms(RankOneTerms terms) {
 }
 
 bool WoodburyInverse::express_terms() {
-  const bool good = factor_->visit_factor([&]<class T>(const SupernodalFactor<T>&) { return express(columns_of<T>()); });
+  const bool good =
+      factor_->visit_factor([&]<class T>(const SupernodalFactor<T>&) { return express(columns_of<T>()); });
   if (!good) {
     terms_ = {};
     active_.clear();
@@ -107,7 +108,8 @@ bool WoodburyInverse::express(NodeColumns<T>& columns) {
     for (int i = 0; i < term.count; ++i) term.place[i] = place[term.column[i]];
   if (active_.empty()) return true;
 
-  const auto negative = std::stable_partition(active_.begin(), active_.end(), [](const Active& a) { return a.positive; });
+  const auto negative =
+      std::stable_partition(active_.begin(), active_.end(), [](const Active& a) { return a.positive; });
   small_.resize(active_terms(), negative - active_.begin());
   columns.join(used_);
   form_small_matrix(columns);
@@ -198,9 +200,8 @@ void WoodburyInverse::apply(const double* b, double* x) {
   if (active_.empty())
     factor_->apply(right_.data(), solution_.data());
   else
-    factor_->solve_with(right_.data(), solution_.data(), [&]<class T>(T* y) {
-      correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), y);
-    });
+    factor_->solve_with(right_.data(), solution_.data(),
+                        [&]<class T>(T* y) { correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), y); });
   frame_.push_forward(solution_.data(), x);
 }
 

@@ -52,8 +52,8 @@ class WoodburyInverse : public InverseOperator {
     std::int32_t column[4], place[4];  // in NodeColumns; among those in use
     double u[4][3];
   };
-  using AnyColumns = std::variant<std::monostate, std::unique_ptr<NodeColumns<float>>,
-                                  std::unique_ptr<NodeColumns<double>>>;
+  using AnyColumns =
+      std::variant<std::monostate, std::unique_ptr<NodeColumns<float>>, std::unique_ptr<NodeColumns<double>>>;
   bool express_terms();
   template <class T>
   NodeColumns<T>& columns_of();

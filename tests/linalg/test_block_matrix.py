@@ -66,3 +66,62 @@ def test_set_zero_clears_every_entry(pattern: _native.BlockPattern) -> None:
 def test_product_refuses_the_wrong_size(pattern: _native.BlockPattern) -> None:
     with pytest.raises(ValueError, match="has 3 entries"):
         multiply(_native.BlockMatrix(pattern), np.zeros(3))
+
+
+def random_matrix(pattern: _native.BlockPattern, rng: np.random.Generator) -> _native.BlockMatrix:
+    matrix = _native.BlockMatrix(pattern)
+    blocks = rng.normal(size=matrix.values.shape)
+    diagonal = np.asarray(pattern.column_begin)[:-1]
+    blocks[diagonal] += blocks[diagonal].transpose(0, 2, 1)
+    matrix.values[:] = blocks
+    return matrix
+
+
+def test_stencils_add_up_like_dense_matrices(pattern: _native.BlockPattern, rng: np.random.Generator) -> None:
+    nodes = rng.integers(0, pattern.nodes, size=(50, 4), dtype=np.int32)
+    nodes[::4] = nodes[::4, :1]  # a contact with a plane repeats its node
+    nodes[1::4, 3] = nodes[1::4, 0]
+    blocks = rng.normal(size=(50, 12, 12))
+    blocks += blocks.transpose(0, 2, 1)
+    larger = _native.BlockPattern(pattern.nodes, nodes)
+    matrix = random_matrix(larger, rng)
+    expected = dense(matrix, larger)
+    for stencil, block in zip(nodes, blocks, strict=True):
+        dofs = (3 * stencil[:, None] + np.arange(3)).ravel()
+        np.add.at(expected, np.ix_(dofs, dofs), block)
+    matrix.add_stencils(nodes, blocks)
+    np.testing.assert_allclose(dense(matrix, larger), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_stencils_that_do_not_fit_are_refused() -> None:
+    matrix = _native.BlockMatrix(_native.BlockPattern(4, np.array([[0, 1]], dtype=np.int32)))
+    with pytest.raises(IndexError, match=r"block \(2, 0\) is not in the pattern"):
+        matrix.add_stencils(np.array([[0, 1, 2, 1]], dtype=np.int32), np.zeros((1, 12, 12)))
+    for node in (-1, 4):
+        with pytest.raises(IndexError, match=r"stencil 1 has a node outside \[0, 4\)"):
+            matrix.add_stencils(np.array([[0, 0, 0, 0], [node] * 4], dtype=np.int32), np.zeros((2, 12, 12)))
+    with pytest.raises(ValueError, match="blocks has 144 entries, expected 288"):
+        matrix.add_stencils(np.zeros((2, 4), dtype=np.int32), np.zeros((1, 12, 12)))
+
+
+def test_a_matrix_over_a_smaller_pattern_is_taken_over(pattern: _native.BlockPattern, rng: np.random.Generator) -> None:
+    mesh = TetMesh.box(cells=(2, 2, 1))
+    extra = rng.integers(0, pattern.nodes, size=(6, 4), dtype=np.int32)
+    outer = _native.BlockPattern(pattern.nodes, np.concatenate([mesh.tets, extra]))
+    assert outer.blocks > pattern.blocks
+    small, large = random_matrix(pattern, rng), random_matrix(outer, rng)
+    mapped = _native.PatternMap(pattern, outer)
+    for _ in range(2):
+        large.set_from(mapped, small)
+        np.testing.assert_array_equal(dense(large, outer), dense(small, pattern))
+        large.values[:] = np.nan
+
+
+def test_patterns_that_do_not_fit_are_refused(pattern: _native.BlockPattern) -> None:
+    bare = _native.BlockPattern(pattern.nodes, np.zeros((0, 4), dtype=np.int32))
+    with pytest.raises(ValueError, match="outer pattern lacks block"):
+        _native.PatternMap(pattern, bare)
+    with pytest.raises(ValueError, match="have 3 and"):
+        _native.PatternMap(_native.BlockPattern(3, np.zeros((0, 4), dtype=np.int32)), pattern)
+    with pytest.raises(ValueError, match="other patterns"):
+        _native.BlockMatrix(pattern).set_from(_native.PatternMap(bare, pattern), _native.BlockMatrix(pattern))

@@ -190,3 +190,51 @@ def test_wrong_sizes_are_refused(inner: tuple[_native.Cholesky, Array]) -> None:
         direction(history, inner[0], np.zeros(6))
     with pytest.raises(ValueError, match="x has 3 entries, expected 6"):
         history.push(np.zeros(6), np.zeros(3), np.zeros(6), np.zeros(6))
+
+
+def random_terms(rng: np.random.Generator, nodes: int, count: int) -> tuple[_native.RankOneTerms, Array]:
+    """Terms of four nodes, some repeated, and their dense sum Kc."""
+    stencil = rng.integers(0, nodes, size=(count, 4), dtype=np.int32)
+    stencil[::3] = stencil[::3, :1]
+    gamma, axis, stiffness = rng.normal(size=(count, 4)), rng.normal(size=(count, 3)), rng.uniform(0, 1e3, size=count)
+    Kc = np.zeros((nodes, 3, nodes, 3))
+    for j in range(count):
+        a = np.zeros((nodes, 3))
+        np.add.at(a, stencil[j], gamma[j, :, None] * axis[j])
+        Kc += stiffness[j] * a[:, :, None, None] * a
+    return _native.RankOneTerms(stencil, gamma, axis, stiffness), Kc.reshape(3 * nodes, 3 * nodes)
+
+
+@pytest.mark.parametrize("terms", [0, 1, 40])
+@pytest.mark.parametrize("count", [0, 1, 3, 7], ids=lambda n: f"{n} pairs")
+def test_terms_are_added_to_every_pair(
+    inner: tuple[_native.Cholesky, Array], count: int, terms: int, rng: np.random.Generator
+) -> None:
+    cholesky, inverse = inner
+    size = len(inverse)
+    native, Kc = random_terms(rng, size // 3, terms)
+    history, all_pairs = _native.Lbfgs(size, WINDOW, 1), pairs(rng, size, count)
+    for pair in all_pairs:
+        assert push(history, pair, rng)
+    g, p = rng.normal(size=size), np.full(size, np.nan)
+    with_terms = [(s, y + Kc @ s) for s, y in all_pairs[-WINDOW:]]
+    expected = -bfgs(inverse, with_terms) @ g
+    for _ in range(2):  # the pairs themselves stay as they are
+        slope = history.direction_with(g, cholesky, native, p)
+        np.testing.assert_allclose(p, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+        assert slope == pytest.approx(g @ expected, rel=1e-10)
+    check(history, inner, all_pairs[-WINDOW:], g)
+
+
+def test_terms_that_do_not_fit_pairs_are_refused(inner: tuple[_native.Cholesky, Array]) -> None:
+    size = len(inner[1])
+    history, g = _native.Lbfgs(size, WINDOW, 1), np.zeros(size)
+
+    def term(node: int, stiffness: float) -> _native.RankOneTerms:
+        nodes = np.full((1, 4), node, dtype=np.int32)
+        return _native.RankOneTerms(nodes, np.ones((1, 4)), np.ones((1, 3)), np.array([stiffness]))
+
+    with pytest.raises(ValueError, match=r"stiffness of term 0 is -1\.0+, expected at least 0"):
+        history.direction_with(g, inner[0], term(0, -1.0), g.copy())
+    with pytest.raises(ValueError, match=rf"node {size // 3}, outside \[0, {size // 3}\)"):
+        history.direction_with(g, inner[0], term(size // 3, 1.0), g.copy())

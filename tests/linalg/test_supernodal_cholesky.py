@@ -348,3 +348,48 @@ def test_right_hand_sides_beyond_the_range_of_float_are_solved_as_well(
     cholesky.factorise(matrix)
     x = solve(cholesky, b)
     np.testing.assert_allclose(solve(cholesky, scale * b) / scale, x, rtol=0, atol=1e-5 * np.abs(x).max())
+
+
+@pytest.mark.parametrize("held", [nothing_held, some_held])
+def test_a_given_order_solves_the_same(mesh: TetMesh, held: object, rng: np.random.Generator) -> None:
+    pattern, matrix = hessian(mesh)
+    mask = held(mesh)  # type: ignore[operator]
+    own = _native.SupernodalCholesky(pattern, mask, 1, "float64")
+    np.testing.assert_array_equal(np.sort(own.node_order), np.arange(pattern.nodes))
+    again = _native.SupernodalCholesky(pattern, mask, 1, "float64", order=own.node_order)
+    other = rng.permutation(pattern.nodes).astype(np.int32)
+    shuffled = _native.SupernodalCholesky(pattern, mask, 1, "float64", order=other)
+    b, found = rng.normal(size=mesh.positions.shape), []
+    for cholesky in (own, again, shuffled):
+        assert cholesky.factorise(matrix) == -1
+        found.append(solve(cholesky, b))
+    np.testing.assert_array_equal(found[1], found[0])
+    np.testing.assert_array_equal(again.node_order, own.node_order)
+    np.testing.assert_array_equal(shuffled.node_order, other)
+    np.testing.assert_allclose(found[2], found[0], rtol=0, atol=1e-11 * np.abs(found[0]).max())
+
+
+def test_an_extended_pattern_reuses_the_order(rng: np.random.Generator) -> None:
+    mesh = MESHES["compact"]()
+    pattern, matrix = hessian(mesh)
+    own = _native.SupernodalCholesky(pattern, some_held(mesh), 1, "float64")
+    extra = rng.integers(0, pattern.nodes, size=(5, 4), dtype=np.int32)
+    outer = _native.BlockPattern(pattern.nodes, np.concatenate([mesh.tets, extra]))
+    larger = _native.BlockMatrix(outer)
+    larger.set_from(_native.PatternMap(pattern, outer), matrix)
+    a = rng.normal(size=(5, 12))
+    larger.add_stencils(extra, 1e3 * a[:, :, None] * a[:, None, :])
+    cholesky = _native.SupernodalCholesky(outer, some_held(mesh), 1, "float64", order=own.node_order)
+    assert cholesky.factorise(larger) == -1
+    b = rng.normal(size=mesh.positions.shape)
+    assert residual(larger, some_held(mesh), solve(cholesky, b), b) < 1e-12
+    assert own.factor_nonzeros <= cholesky.factor_nonzeros < 2 * own.factor_nonzeros
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [0, 1, 2, 2], [0, 1, 2, 4], [-1, 0, 1, 2]])
+def test_an_order_that_is_none_is_refused(order: list[int]) -> None:
+    pattern, _ = hessian(MESHES["one tet"]())
+    message = "order has 3 nodes, expected all 4" if len(order) == 3 else r"order holds node -?\d twice or outside"
+    given = np.array(order, dtype=np.int32)
+    with pytest.raises(ValueError, match=message):
+        _native.SupernodalCholesky(pattern, np.zeros((4, 3), dtype=np.uint8), 1, "float64", order=given)

@@ -57,7 +57,9 @@ def random_terms(rng: np.random.Generator, candidates: NDArray[np.int32], count:
 class Body:
     """A box, somewhat deformed, with some held nodes and axes: its factor, and the dense inverse behind it."""
 
-    def __init__(self, precision: str, *, cells: tuple[int, int, int] = (6, 3, 3), threads: int = 1) -> None:
+    def __init__(
+        self, precision: str, *, cells: tuple[int, int, int] = (6, 3, 3), threads: int = 1, simd: str = ""
+    ) -> None:
         rng = np.random.default_rng(5)
         self.mesh = TetMesh.box((1.0, 0.5, 0.5), cells=cells)
         self.system: System = make_system(self.mesh, mass="consistent")
@@ -67,7 +69,7 @@ class Body:
         self.fixed = np.zeros((self.count, 3), dtype=np.uint8)
         self.fixed[self.mesh.positions[:, 0] < 1e-9] = 1
         self.fixed[self.count // 2, 1] = 1
-        self.factor = _native.SupernodalCholesky(self.system.pattern, self.fixed, threads, precision)
+        self.factor = _native.SupernodalCholesky(self.system.pattern, self.fixed, threads, precision, simd)
         self.factorise(1e4)
         self.inverse = _native.WoodburyInverse(self.factor, self.system.blocks, self.fixed, threads)
         self.carried = False
@@ -83,7 +85,7 @@ class Body:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        return self.fixed.ravel() == 0
+        return np.asarray(self.fixed.ravel() == 0)
 
     def maps(self) -> Array:
         """T as a dense matrix, with identities where an axis is held."""
@@ -149,6 +151,15 @@ def test_inverse_is_that_of_the_dense_sum(precision: str, count: int, carried: b
     assert_close(dense_inverse(body), body.expected(terms), precision)
 
 
+@pytest.mark.parametrize("simd", _native.simd_levels())
+def test_every_simd_level_gives_the_inverse(precision: str, simd: str) -> None:
+    body = Body(precision, simd=simd)
+    body.carry()
+    terms = body.terms(200)
+    assert body.inverse.set_terms(terms.native)
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+
+
 def test_without_terms_it_is_the_carried_inverse(precision: str, rng: np.random.Generator) -> None:
     body = Body(precision)
     carried = _native.CarriedInverse(body.factor, body.system.blocks, body.fixed, 1)
@@ -162,7 +173,7 @@ def test_without_terms_it_is_the_carried_inverse(precision: str, rng: np.random.
 
 
 @pytest.mark.parametrize("negative", [1, 20, 150])
-def test_terms_that_are_in_the_factor_are_taken_away(negative: int) -> None:
+def test_terms_that_are_in_the_factor_are_taken_away(precision: str, negative: int) -> None:
     # A + C K C^T as the factor's own matrix, less C K C^T, plus others.
     body = Body("float64")
     pattern = _native.BlockPattern(body.count, np.arange(body.count, dtype=np.int32)[None])
@@ -170,14 +181,14 @@ def test_terms_that_are_in_the_factor_are_taken_away(negative: int) -> None:
     elastic, matrix = body.matrix, _native.BlockMatrix(pattern)
     matrix.set_from(_native.PatternMap(body.system.pattern, pattern), elastic)
     matrix.add_stencils(taken.nodes, stencils(taken))
-    factor = _native.SupernodalCholesky(pattern, body.fixed, 1, "float64")
+    factor = _native.SupernodalCholesky(pattern, body.fixed, 1, precision)
     assert factor.factorise(matrix) == -1
     inverse = _native.WoodburyInverse(factor, body.system.blocks, body.fixed, 1)
     both = join(replace(taken, stiffness=-taken.stiffness), added)
     shuffled = np.random.default_rng(3).permutation(len(both.nodes))
     both = Terms(*(np.ascontiguousarray(part[shuffled]) for part in vars(both).values()))
     assert inverse.set_terms(both.native)
-    assert_close(apply(inverse, np.eye(3 * body.count)).T, body.expected(added), "float64")
+    assert_close(apply(inverse, np.eye(3 * body.count)).T, body.expected(added), precision)
 
 
 def test_taking_away_too_much_is_told_and_leaves_no_terms(precision: str, rng: np.random.Generator) -> None:
@@ -201,7 +212,9 @@ def test_tiny_and_huge_stiffness(precision: str, factor: float) -> None:
     terms = body.terms(60, scale)
     assert body.inverse.set_terms(terms.native)
     found, expected = dense_inverse(body), body.expected(body.terms(60, np.minimum(scale, 1e7)))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=(1e-6 if precision == "float64" else 1e-3) * expected.max())
+    np.testing.assert_allclose(
+        found, expected, rtol=0, atol=(1e-6 if precision == "float64" else 1e-3) * expected.max()
+    )
 
 
 def test_equal_terms_count_twice(precision: str) -> None:
@@ -333,6 +346,8 @@ def test_product_with_terms_is_that_of_the_dense_matrix(rng: np.random.Generator
     expected = out.ravel() - 0.7 * terms.dense(9) @ v.ravel()
     native = terms.native
     assert native.size == len(native) == 30
+    for name, part in vars(terms).items():
+        np.testing.assert_array_equal(getattr(native, name), part)
     native.add_product(v, out, -0.7)
     np.testing.assert_allclose(out.ravel(), expected, rtol=0, atol=1e-12)
 
