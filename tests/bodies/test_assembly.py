@@ -233,9 +233,9 @@ def test_wrong_members_are_refused():
     body = Body(small_bar(), StableNeoHookean(), name="ground")
     for bodies, obstacles, message in (
         ([], [], "a simulation needs a body, and none is given"),
-        ([small_bar()], [], "number 0 of the bodies is a TetMesh, must be a Body"),
+        ([small_bar()], [], "number 0 of the bodies is a TetMesh, must be Body"),
         (3, [], "bodies = int must be a sequence of Body"),
-        ([body], [body], "number 0 of the obstacles is a Body, must be a Obstacle or Plane"),
+        ([body], [body], "number 0 of the obstacles is a Body, must be Obstacle or Plane"),
         ([body], GROUND, "obstacles = Obstacle must be a sequence of Obstacle or Plane"),
         ([body, body], [], "a body or obstacle is given more than once"),
         ([body], [GROUND], "the name 'ground' is given to more than one body or obstacle"),

@@ -163,7 +163,7 @@ def _checked(what: str, given: Iterable[T], *kinds: type) -> tuple[T, ...]:
     members = tuple(given)
     for k, member in enumerate(members):
         if not isinstance(member, kinds):
-            raise InputError(f"number {k} of the {what} is a {type(member).__name__}, must be a {allowed}")
+            raise InputError(f"number {k} of the {what} is a {type(member).__name__}, must be {allowed}")
     return members
 
 
