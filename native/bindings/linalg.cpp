@@ -1,4 +1,5 @@
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
 #include "bindings/bindings.hpp"
@@ -152,13 +153,16 @@ void bind_linalg(nb::module_& m) {
       .def(
           "direction_with",
           [](Lbfgs& h, const Array<const double>& g, InverseOperator& inner, const RankOneTerms& terms,
-             const Array<double>& p) {
+             const Array<double>& p, const std::optional<Array<const double>>& beta) {
             if (inner.size() != h.size()) throw std::invalid_argument("the inner inverse has another size");
-            return h.direction_with(sized(g, h.size(), "g"), inner, terms, sized(p, h.size(), "p"));
+            const auto apart = beta ? std::span<const double>(sized(*beta, terms.size(), "beta"), beta->size())
+                                    : std::span<const double>();
+            return h.direction_with(sized(g, h.size(), "g"), apart, inner, terms, sized(p, h.size(), "p"));
           },
-          nb::arg("g"), nb::arg("inner"), nb::arg("terms"), nb::arg("p").noconvert(), ReleaseGil(),
-          "As direction, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and "
-          "`inner` takes in.");
+          nb::arg("g"), nb::arg("inner"), nb::arg("terms"), nb::arg("p").noconvert(), nb::arg("beta") = nb::none(),
+          ReleaseGil(),
+          "As direction, for the gradient g + C beta, with y + C K C^T s in place of y in each pair, for terms C K C^T "
+          "that the pairs leave out and `inner` takes in.");
 
   m.def(
       "dot",

@@ -40,6 +40,13 @@ void bind_terms(nb::module_& m) {
           inside)
       .def("__len__", &RankOneTerms::size)
       .def(
+          "add_combination",
+          [](const RankOneTerms& terms, const Array<const double>& beta, const Array<double>& out) {
+            terms.check_nodes(static_cast<std::int64_t>(out.size()) / 3);
+            terms.add_combination({sized(beta, terms.size(), "beta"), beta.size()}, out.data());
+          },
+          nb::arg("beta"), nb::arg("out").noconvert(), ReleaseGil(), "out += C beta, shapes (k,) and (n, 3).")
+      .def(
           "add_product",
           [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale) {
             terms.check_nodes(static_cast<std::int64_t>(v.size()) / 3);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -39,46 +40,57 @@ void Lbfgs::take_terms(const RankOneTerms& terms) {
   terms.check_nodes(size_ / 3);
   const std::int64_t count = terms.size();
   with_terms_.resize(count_);
-  term_changes_.resize(count_ * count);
+  along_s_.resize(count_ * count);
+  change_.resize(count_ * count);
   for (int k = 0; k < count_; ++k) {
     with_terms_[k] = curvature_[slot(k)];
     for (std::int64_t j = 0; j < count; ++j) {
       const double along = terms.dot(j, s(k));
-      term_changes_[k * count + j] = terms.stiffness(j) * along;
+      along_s_[k * count + j] = along;
+      change_[k * count + j] = terms.stiffness(j) * along;
       with_terms_[k] += terms.stiffness(j) * along * along;
     }
   }
 }
 
-double Lbfgs::dot_y(int k, const RankOneTerms& terms, const double* v) {
-  double sum = dot(y(k), v, size_, threads_);
-  for (std::int64_t j = 0; j < terms.size(); ++j) sum += term_changes_[k * terms.size() + j] * terms.dot(j, v);
-  return sum;
-}
-
-void Lbfgs::add_y(int k, const RankOneTerms& terms, double scale, double* v) {
-  add_scaled(scale, y(k), v, size_, threads_);
-  for (std::int64_t j = 0; j < terms.size(); ++j) terms.add(j, scale * term_changes_[k * terms.size() + j], v);
-}
-
-double Lbfgs::direction_with(const double* g, InverseOperator& inner, const RankOneTerms& terms, double* p) {
-  for (std::int64_t j = 0; j < terms.size(); ++j)
+double Lbfgs::direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
+                             const RankOneTerms& terms, double* p) {
+  const std::int64_t count = terms.size();
+  for (std::int64_t j = 0; j < count; ++j)
     if (terms.stiffness(j) < 0.0)
       throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " +
                                   std::to_string(terms.stiffness(j)) + ", expected at least 0");
   take_terms(terms);
+  beta_.assign(count, 0.0);
+  std::ranges::copy(beta, beta_.begin());
+  along_.resize(count);
+  const auto few_dot = [&](const double* a, const double* b) { return std::inner_product(a, a + count, b, 0.0); };
+  const auto few_add = [&](double scale, const double* a, std::vector<double>& to) {
+    for (std::int64_t j = 0; j < count; ++j) to[j] += scale * a[j];
+  };
+
   std::copy(g, g + size_, work_.data());
   for (int k = count_ - 1; k >= 0; --k) {
-    alpha_[k] = dot(s(k), work_.data(), size_, threads_) / with_terms_[k];
-    add_y(k, terms, -alpha_[k], work_.data());
+    const double *along = &along_s_[k * count], *change = &change_[k * count];
+    alpha_[k] = (dot(s(k), work_.data(), size_, threads_) + few_dot(along, beta_.data())) / with_terms_[k];
+    add_scaled(-alpha_[k], y(k), work_.data(), size_, threads_);
+    few_add(-alpha_[k], change, beta_);
   }
-  inner.apply(work_.data(), p);
+  if (count == 0)
+    inner.apply(work_.data(), p);
+  else
+    inner.apply_split(work_.data(), terms, beta_.data(), p, along_.data());
   for (int k = 0; k < count_; ++k) {
-    const double beta = dot_y(k, terms, p) / with_terms_[k];
-    add_scaled(alpha_[k] - beta, s(k), p, size_, threads_);
+    const double *along = &along_s_[k * count], *change = &change_[k * count];
+    const double weight =
+        alpha_[k] - (dot(y(k), p, size_, threads_) + few_dot(change, along_.data())) / with_terms_[k];
+    add_scaled(weight, s(k), p, size_, threads_);
+    few_add(weight, along, along_);
   }
   for (std::int64_t k = 0; k < size_; ++k) p[k] = -p[k];
-  return dot(g, p, size_, threads_);
+  double slope = dot(g, p, size_, threads_);
+  for (std::size_t j = 0; j < beta.size(); ++j) slope -= beta[j] * along_[j];
+  return slope;
 }
 
 }  // namespace qlb

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "linalg/cholesky.hpp"
@@ -20,10 +21,15 @@ class Lbfgs {
   // positive.
   bool push(const double* x_old, const double* x, const double* g_old, const double* g);
   // p = -H g, H the quasi-Newton inverse over `inner`. Returns g.p, the slope along p.
-  double direction(const double* g, InverseOperator& inner, double* p) { return direction_with(g, inner, {}, p); }
-  // The same with y + C K C^T s in place of each y, for terms that do not take away (structured quasi-Newton: what the
-  // pairs hold is the change of the gradient without these terms, and their Hessian of the moment is known).
-  double direction_with(const double* g, InverseOperator& inner, const RankOneTerms& terms, double* p);
+  double direction(const double* g, InverseOperator& inner, double* p) {
+    return direction_with(g, {}, inner, {}, p);
+  }
+  // The same for g + C beta, with y + C K C^T s in place of each y, for terms that do not take away (structured
+  // quasi-Newton: what the pairs hold is the change of the gradient without these terms, and their Hessian of the
+  // moment is known). Vectors in the span of C are kept apart by their coefficients all the way: next to stiff terms
+  // the solves of a float32 factor would leave nothing of the rest. beta: one per term, or none.
+  double direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
+                        const RankOneTerms& terms, double* p);
 
   std::int64_t size() const { return size_; }
 
@@ -34,16 +40,14 @@ class Lbfgs {
   std::int64_t slot(int k) const { return (first_ + k) % (window_ + 1); }
 
   void take_terms(const RankOneTerms& terms);
-  double dot_y(int k, const RankOneTerms& terms, const double* v);        // y' . v
-  void add_y(int k, const RankOneTerms& terms, double scale, double* v);  // v += scale y'
-
   std::int64_t size_;
   int window_, threads_;
   int first_ = 0, count_ = 0;
   Aligned<double> pairs_;  // (window + 1, 2, size)
   std::vector<double> curvature_, alpha_;
   std::vector<double> with_terms_;    // s.y' of each pair
-  std::vector<double> term_changes_;  // (pairs, terms), stiffness_j a_j.s
+  std::vector<double> along_s_, change_;  // (pairs, terms): a_j.s, stiffness_j a_j.s
+  std::vector<double> beta_, along_;      // of what is worked on: coefficients of C, and C^T p
   Aligned<double> work_;
 };
 

@@ -75,4 +75,8 @@ void RankOneTerms::add_product(const double* v, double* out, double scale) const
   for (std::int64_t j = 0; j < size(); ++j) add(j, scale * stiffness_[j] * dot(j, v), out);
 }
 
+void RankOneTerms::add_combination(std::span<const double> beta, double* out) const {
+  for (std::int64_t j = 0; j < size(); ++j) add(j, beta[j], out);
+}
+
 }  // namespace qlb

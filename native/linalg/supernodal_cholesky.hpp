@@ -46,8 +46,8 @@ class SupernodalCholesky : public Cholesky {
   };
   Sparse forward_sparse(std::span<const std::int64_t> dof, std::span<const double> value);
 
-  // x = P^T L^-T f(L^-1 P b), f(T* y) changing y in place, y in elimination order and in the precision of the factor. y
-  // is scaled by a power of two, so f must be linear.
+  // x = P^T L^-T f(L^-1 P b), f(T* y, double scale) changing scale y in place, in elimination order and in the precision
+  // of the factor; scale is a power of two.
   template <class F>
   void solve_with(const double* b, double* x, const F& f);
 
@@ -112,7 +112,7 @@ void SupernodalCholesky::solve_with(const double* b, double* x, const F& f) {
         auto* y = numeric->y.data();
         const double scale = take(b, y);
         numeric->factor.forward(y, rows(), 1);
-        f(y);
+        f(y, scale);
         numeric->factor.backward(y, rows(), 1);
         give(y, scale, x);
       },

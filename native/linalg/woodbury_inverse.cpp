@@ -119,8 +119,10 @@ bool WoodburyInverse::express(NodeColumns<T>& columns) {
 template <class T>
 auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) const -> Active {
   Active term;
+  term.term = j;
   term.positive = terms_.stiffness(j) > 0.0;
   const double root = std::sqrt(std::abs(terms_.stiffness(j)));
+  term.root = root;
   if (root == 0.0) return term;
   for (int i = 0; i < 4; ++i) {
     const std::int32_t node = terms_.nodes(j)[i];
@@ -170,9 +172,9 @@ void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
   }
 }
 
-// y -= W S^-1 W^T y
+// scale y -= W c with c = S^-1 (W^T scale y - sign |K|^-1/2 beta), which stays in term_products_; no beta: zeros
 template <class T>
-void WoodburyInverse::correct(NodeColumns<T>& columns, T* y) {
+void WoodburyInverse::correct(NodeColumns<T>& columns, const double* beta, T* y, double scale) {
   node_products_.resize(3 * used_.size());
   term_products_.resize(active_.size());
   columns.dots(used_, y, node_products_.data());
@@ -181,6 +183,8 @@ void WoodburyInverse::correct(NodeColumns<T>& columns, T* y) {
     double sum = 0.0;
     for (int i = 0; i < term.count; ++i)
       for (int c = 0; c < 3; ++c) sum += term.u[i][c] * node_products_[3 * term.place[i] + c];
+    sum *= scale;
+    if (beta != nullptr) sum -= (term.positive ? 1.0 : -1.0) / term.root * beta[term.term];
     term_products_[j] = sum;
   }
   small_.solve(term_products_.data());
@@ -188,12 +192,12 @@ void WoodburyInverse::correct(NodeColumns<T>& columns, T* y) {
   for (std::size_t j = 0; j < active_.size(); ++j) {
     const Active& term = active_[j];
     for (int i = 0; i < term.count; ++i)
-      for (int c = 0; c < 3; ++c) node_products_[3 * term.place[i] + c] += term.u[i][c] * term_products_[j];
+      for (int c = 0; c < 3; ++c) node_products_[3 * term.place[i] + c] += term.u[i][c] * (term_products_[j] / scale);
   }
   columns.subtract(used_, node_products_.data(), y);
 }
 
-void WoodburyInverse::apply(const double* b, double* x) {
+void WoodburyInverse::solve(const double* b, const double* beta, double* x) {
   if (!active_.empty() && version_ != factor_->version())
     throw std::logic_error("the factor was made anew since the terms were set: forget them and set them again");
   frame_.pull_back(b, right_.data());
@@ -201,8 +205,34 @@ void WoodburyInverse::apply(const double* b, double* x) {
     factor_->apply(right_.data(), solution_.data());
   else
     factor_->solve_with(right_.data(), solution_.data(),
-                        [&]<class T>(T* y) { correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), y); });
+                        [&]<class T>(T* y, double scale) {
+                          correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), beta, y, scale);
+                        });
   frame_.push_forward(solution_.data(), x);
+}
+
+void WoodburyInverse::apply(const double* b, double* x) {
+  solve(b, nullptr, x);
+}
+
+void WoodburyInverse::apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x,
+                                  double* along) {
+  if (terms.size() != terms_.size()) throw std::invalid_argument("the terms are not those that were set");
+  // What is not in the small matrix has no stiffness (or no free node): its part of b is as small as any.
+  std::vector<char> kept(terms.size(), 0);
+  for (const Active& active : active_) kept[active.term] = 1;
+  split_.assign(b, b + size());
+  for (std::int64_t j = 0; j < terms.size(); ++j)
+    if (!kept[j] && beta[j] != 0.0) terms.add(j, beta[j], split_.data());
+  solve(split_.data(), beta, x);
+  for (std::int64_t j = 0; j < terms.size(); ++j)
+    if (!kept[j]) along[j] = terms.dot(j, x);
+  // W^T (y - W c) = sign (|K|^-1/2 beta + c)
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    const Active& active = active_[k];
+    const double scaled = beta[active.term] / active.root + term_products_[k];
+    along[active.term] = (active.positive ? scaled : -scaled) / active.root;
+  }
 }
 
 }  // namespace qlb

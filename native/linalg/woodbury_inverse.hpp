@@ -38,6 +38,9 @@ class WoodburyInverse : public InverseOperator {
 
   std::int64_t size() const override { return factor_->size(); }
   void apply(const double* b, double* x) override;
+  // `terms` are those that were set. With W and S as above, S^-1 (W^T y - sign |K|^-1/2 beta) takes the place of
+  // S^-1 W^T y, so that stiff terms cancel nothing.
+  void apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x, double* along) override;
 
   std::int64_t terms() const { return terms_.size(); }
   std::int64_t active_terms() const { return static_cast<std::int64_t>(active_.size()); }  // those not wholly held
@@ -47,6 +50,8 @@ class WoodburyInverse : public InverseOperator {
  private:
   // A term in the frame of the factor: |k|^1/2 T_i^T axis gamma_i at up to four columns.
   struct Active {
+    std::int64_t term = 0;  // its number in terms_
+    double root = 0.0;      // |k|^1/2
     int count = 0;
     bool positive = true;
     std::int32_t column[4], place[4];  // in NodeColumns; among those in use
@@ -64,7 +69,8 @@ class WoodburyInverse : public InverseOperator {
   template <class T>
   void form_small_matrix(const NodeColumns<T>& columns);
   template <class T>
-  void correct(NodeColumns<T>& columns, T* y);
+  void correct(NodeColumns<T>& columns, const double* beta, T* y, double scale);
+  void solve(const double* b, const double* beta, double* x);
 
   std::shared_ptr<SupernodalCholesky> factor_;
   MaterialFrame frame_;
@@ -76,7 +82,7 @@ class WoodburyInverse : public InverseOperator {
   std::vector<std::int32_t> used_;  // columns in use, in elimination order
   DenseCholesky small_;
   std::vector<double> node_products_, term_products_;
-  Aligned<double> right_, solution_;
+  Aligned<double> right_, solution_, split_;
 };
 
 }  // namespace qlb

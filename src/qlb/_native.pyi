@@ -373,9 +373,9 @@ class Lbfgs:
 
     def direction(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float: ...
 
-    def direction_with(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, terms: RankOneTerms, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float:
+    def direction_with(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, terms: RankOneTerms, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> float:
         """
-        As direction, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and `inner` takes in.
+        As direction, for the gradient g + C beta, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and `inner` takes in.
         """
 
 def dot(a: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int) -> float: ...
@@ -406,6 +406,9 @@ class RankOneTerms:
     def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
 
     def __len__(self) -> int: ...
+
+    def add_combination(self, beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """out += C beta, shapes (k,) and (n, 3)."""
 
     def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0) -> None:
         """out += scale C K C^T v, both of shape (n, 3)."""

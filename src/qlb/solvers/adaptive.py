@@ -89,12 +89,18 @@ class QLA(FactoredLbfgs):
             self._refactor(problem, point, self.settings.projection)
         if self._low_rank is None or point.contact is None:
             return super().direction(problem, point)
+        contact = point.contact
         with problem.timer.section("contact"):
-            terms = _native.RankOneTerms(*point.contact.terms())
+            terms = _native.RankOneTerms(*contact.terms())
             self._low_rank.set_terms(terms)
+            forces = np.zeros(terms.size)  # of contact, which are kept apart from the rest of the gradient
+            forces[: contact.count] = contact.contacts.force
+            rest = point.gradient.copy()
+            terms.add_combination(forces, rest)
+            problem.system.clear_held(rest)
         with problem.timer.section("solve"):
-            p = np.empty_like(point.gradient)
-            slope = self.history.direction_with(point.gradient, self._low_rank, terms, p)
+            p = np.empty_like(rest)
+            slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces)
             return p, slope
 
     def accept(self, old: Point, new: Point) -> None:
