@@ -117,11 +117,12 @@ void Candidates::build(const double* x, const double* p, double margin, double r
 
 void Candidates::find_pairs(const std::vector<Box>& boxes, bool within_groups, double radius) {
   const auto count = static_cast<std::int32_t>(trees_.groups.size());
+  const std::vector<SmallBox> small(boxes.begin(), boxes.end());
   std::vector<TreePair<1, 3>> vertex_faces;
   std::vector<TreePair<2, 2>> edge_edges;
   for (std::int32_t g = 0; g < count; ++g) {
     GroupTrees& group = trees_.groups[g];
-    if (within_groups ? group.meets_itself : group.meets_others) group.refit(boxes);
+    if (within_groups ? group.meets_itself : group.meets_others) group.refit(small);
   }
   for (std::int32_t g = 0; g < count; ++g)
     for (std::int32_t h = 0; h < count; ++h) {
