@@ -6,8 +6,6 @@
 namespace qlb {
 namespace {
 
-constexpr std::int32_t kLeaf = 4;  // primitives in a leaf, at most
-
 double Vec3::* longest_side(const Box& box) {
   const Vec3 side = box.hi - box.lo;
   if (side.x >= side.y && side.x >= side.z) return &Vec3::x;
@@ -47,7 +45,7 @@ void AabbTree::split(std::span<const Vec3> centres, std::int32_t first, std::int
 void AabbTree::refit_nodes() {
   for (auto i = static_cast<std::int32_t>(nodes_.size()) - 1; i >= 0; --i) {  // children come after their parent
     Node& node = nodes_[i];
-    node.box = Box{};
+    node.box = SmallBox{};
     for (std::int32_t k = node.first; k < node.first + node.count; ++k) node.box.add(boxes_[k]);
     if (node.count > 0) continue;
     const Node& left = nodes_[i + 1];

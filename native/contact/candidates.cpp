@@ -29,26 +29,47 @@ std::array<Vec3, 4> load_motion(const double* p, const std::array<std::int32_t, 
   return {node_vector(p, nodes[0]), node_vector(p, nodes[1]), node_vector(p, nodes[2]), node_vector(p, nodes[3])};
 }
 
-// Whether two parallel planes more than `distance` apart have the boxes of the first `first` nodes on one side and
-// those of the others on the other side. They are sought normal to the line between the closest points of the
-// primitives at the centres of the boxes.
+// Boxes of the four nodes of a pair, of which [0, first) are the first primitive.
+template <int first>
+struct BoxPair {
+  std::array<Vec3, 4> centre, half;
+
+  explicit BoxPair(const std::array<const Box*, 4>& boxes) {
+    for (int i = 0; i < 4; ++i) {
+      centre[i] = 0.5 * (boxes[i]->lo + boxes[i]->hi);
+      half[i] = 0.5 * (boxes[i]->hi - boxes[i]->lo);
+    }
+  }
+
+  // Whether two planes normal to n, more than `distance` apart, have the first primitive beyond one and the second
+  // beyond the other.
+  bool separated_along(Vec3 n, double distance) const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (int i = 0; i < 4; ++i) {
+      const double height = dot(n, centre[i]);
+      const double reach = std::abs(n.x) * half[i].x + std::abs(n.y) * half[i].y + std::abs(n.z) * half[i].z;
+      if (i < first) {
+        low = std::min(low, height - reach);
+      } else {
+        high = std::max(high, height + reach);
+      }
+    }
+    return low - high > distance * norm(n);
+  }
+
+  Vec3 between_middles() const {
+    if constexpr (first == 1) return centre[0] - (1.0 / 3.0) * (centre[1] + centre[2] + centre[3]);
+    return 0.5 * (centre[0] + centre[1] - centre[2] - centre[3]);
+  }
+};
+
+// Whether planes are found that keep all of the boxes of one primitive more than `distance` from those of the other:
+// normal to the line of the middles, which is quick, or to that of the closest points, both for the boxes' centres.
 template <int first>
 bool separated(const std::array<const Box*, 4>& boxes, double distance) {
-  std::array<Vec3, 4> centre, half;
-  for (int i = 0; i < 4; ++i) {
-    centre[i] = 0.5 * (boxes[i]->lo + boxes[i]->hi);
-    half[i] = 0.5 * (boxes[i]->hi - boxes[i]->lo);
-  }
-  const ClosestPoints closest = closest_points<first>(centre);
-  if (!(closest.distance2 > distance * distance)) return false;
-  const Vec3 n = (1.0 / std::sqrt(closest.distance2)) * closest.apart;
-  const auto reach = [&](int i) {
-    return std::abs(n.x) * half[i].x + std::abs(n.y) * half[i].y + std::abs(n.z) * half[i].z;
-  };
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (int i = 0; i < first; ++i) low = std::min(low, dot(n, centre[i]) - reach(i));
-  for (int i = first; i < 4; ++i) high = std::max(high, dot(n, centre[i]) + reach(i));
-  return low - high > distance;
+  const BoxPair<first> pair(boxes);
+  return pair.separated_along(pair.between_middles(), distance) ||
+         pair.separated_along(closest_points<first>(pair.centre).apart, distance);
 }
 
 }  // namespace
@@ -119,10 +140,6 @@ void Candidates::find_pairs(const std::vector<Box>& boxes, bool within_groups, d
   const auto count = static_cast<std::int32_t>(trees_.groups.size());
   std::vector<TreePair<1, 3>> vertex_faces;
   std::vector<TreePair<2, 2>> edge_edges;
-  for (std::int32_t g = 0; g < count; ++g) {
-    GroupTrees& group = trees_.groups[g];
-    if (within_groups ? group.meets_itself : group.meets_others) group.refit(boxes);
-  }
   for (std::int32_t g = 0; g < count; ++g)
     for (std::int32_t h = 0; h < count; ++h) {
       if ((g == h) != within_groups || !surface_->allowed(g, h)) continue;
@@ -130,6 +147,10 @@ void Candidates::find_pairs(const std::vector<Box>& boxes, bool within_groups, d
       vertex_faces.push_back({&a.vertices, &b.faces});
       if (g <= h) edge_edges.push_back({&a.edges, &b.edges});
     }
+  if (vertex_faces.empty()) return;
+  const std::vector<SmallBox> small(boxes.begin(), boxes.end());
+  for (GroupTrees& group : trees_.groups)
+    if (within_groups ? group.meets_itself : group.meets_others) group.refit(small);
   search(vertex_faces, radius, collector_, vertex_faces_, [&](const auto& a, const auto& b) {
     return !separated<1>({&boxes[a[0]], &boxes[b[0]], &boxes[b[1]], &boxes[b[2]]}, radius);
   });

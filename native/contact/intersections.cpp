@@ -57,8 +57,11 @@ bool segment_meets_triangle(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
 std::vector<Pair> Candidates::intersections(const double* x) {
   check_finite(x, "x");
   const auto at = [&](std::int32_t slot) { return load3(x + 3 * static_cast<std::int64_t>(trees_.nodes[slot])); };
-  std::vector<Box> boxes(trees_.nodes.size());
-  for (std::size_t slot = 0; slot < boxes.size(); ++slot) boxes[slot].add(at(static_cast<std::int32_t>(slot)));
+  std::vector<SmallBox> boxes;
+  for (std::size_t slot = 0; slot < trees_.nodes.size(); ++slot) {
+    const Vec3 place = at(static_cast<std::int32_t>(slot));
+    boxes.emplace_back(Box{place, place});
+  }
   std::vector<TreePair<2, 3>> trees;
   const auto count = static_cast<std::int32_t>(trees_.groups.size());
   for (GroupTrees& group : trees_.groups) group.refit(boxes);

@@ -19,9 +19,9 @@ struct PrimitiveTree {
   std::vector<std::int32_t> ids;                       // node, edge or face at each place
 
   // boxes: of each slot
-  void refit(const std::vector<Box>& boxes) {
+  void refit(const std::vector<SmallBox>& boxes) {
     tree.refit([&](std::size_t place) {
-      Box box = boxes[slots[place][0]];
+      SmallBox box = boxes[slots[place][0]];
       for (std::size_t k = 1; k < width; ++k) box.add(boxes[slots[place][k]]);
       return box;
     });
@@ -35,7 +35,7 @@ struct GroupTrees {
   std::int32_t first = 0, last = 0;  // slots [first, last)
   bool meets_itself = false, meets_others = false;
 
-  void refit(const std::vector<Box>& boxes) {
+  void refit(const std::vector<SmallBox>& boxes) {
     vertices.refit(boxes);
     edges.refit(boxes);
     faces.refit(boxes);
@@ -85,10 +85,10 @@ class OrderedCollector {
 
 template <std::size_t A, std::size_t B>
 bool share_a_node(const std::array<std::int32_t, A>& a, const std::array<std::int32_t, B>& b) {
+  bool shared = false;
   for (const std::int32_t i : a)
-    for (const std::int32_t j : b)
-      if (i == j) return true;
-  return false;
+    for (const std::int32_t j : b) shared |= i == j;
+  return shared;
 }
 
 // Appends to `out` the ids (of a, of b) of all pairs that share no node, whose boxes are within `distance` (infinity

@@ -82,6 +82,34 @@ def test_what_is_covered_is_complete(rng: np.random.Generator) -> None:
     assert covered >= 5
 
 
+@pytest.mark.parametrize("place", [1e3, 1e7, -1e10])
+def test_far_from_the_origin(rng: np.random.Generator, place: float) -> None:
+    # Boxes are floats in the trees: what they round must only add work.
+    soup = random_soup(rng)
+    soup = Soup(soup.x + place, soup.faces, soup.group, soup.allowed)
+    p = 0.1 * rng.normal(size=soup.x.shape)
+    candidates = soup.candidates()
+    candidates.build(soup.x, p, 0.01, 0.05)
+    for t in (0.0, 1.0):
+        assert check_complete(soup, candidates, soup.x + t * p, 0.05) > 0
+
+
+def test_groups_without_faces(rng: np.random.Generator) -> None:
+    soup = random_soup(rng, groups=2)
+    none = np.zeros((0, 3), dtype=np.int32)
+    for faces in (soup.faces[:16], none):  # of the first group; of none
+        bare = Soup(soup.x, faces, soup.group, soup.allowed)
+        candidates = bare.candidates()
+        candidates.build(soup.x, soup.x, 0.1, 0.1)
+        assert candidates.covers(soup.x, soup.x)
+        assert bool(len(candidates.vertex_faces)) == bool(len(faces))
+        assert len(candidates.intersections(soup.x)) == 0 or len(faces)
+    assert candidates.vertex_faces.shape == candidates.edge_edges.shape == (0, 2)
+    assert candidates.step_bound(soup.x, soup.x) == 1.0
+    assert candidates.limiting is None
+    assert candidates.minimum_distance(soup.x) == np.inf
+
+
 def test_boxes_that_pass_each_other() -> None:
     soup = boxes([(0, 0, 0), (1.05, 0.3, 0.1), (3, 0, 0)])
     p = np.array([0.5, -0.5, 0.0])[soup.group][:, None] * [1.0, 0.0, 0.0]
