@@ -7,6 +7,7 @@ from importlib.metadata import version as _version
 # before the OpenMP runtime is loaded; a value that the user has set wins.
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
+from qlb import shapes
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
 from qlb.errors import InputError, QlbError
 from qlb.fields import TimeExpression, TimeTable
@@ -62,4 +63,5 @@ __all__ = [
     "Traction",
     "Translation",
     "__version__",
+    "shapes",
 ]
