@@ -62,7 +62,7 @@ def test_angles_of_any_surface_in_any_place():
             shapes.sphere(0.4, generator.uniform(-0.5, 0.5, 3)), 0.2
         )
         solid = solid.rotated(generator.normal(size=3), generator.uniform(0, 360)).moved(generator.normal(size=3))
-        angles = dihedral_angles(shapes.mesh_solid(solid, edge=generator.uniform(0.08, 0.14)))
+        angles = dihedral_angles(shapes.mesh_solid(solid, edge=generator.uniform(0.08, 0.14), smoothing=False))
         low, high = min(low, angles.min()), max(high, angles.max())
     assert low >= 10.0
     assert high <= 164.8
@@ -72,6 +72,16 @@ def test_two_pieces_are_refused():
     apart = shapes.sphere(0.3) | shapes.sphere(0.3, (1, 0, 0))
     with pytest.raises(qlb.InputError, match="pair of 2000 tets falls into 2 pieces"):
         shapes.mesh_solid(apart, tets=2000, name="pair")
+
+
+def test_holes_where_there_should_be_none_are_refused():
+    with pytest.raises(qlb.InputError, match="its surface has Euler characteristic 0, not 2"):
+        shapes.mesh_solid(shapes.ring(0.1, 0.04), tets=2000, euler=2)
+
+
+def test_a_solid_too_thin_for_its_tets_is_refused_soon():
+    with pytest.raises(qlb.InputError, match="too much to fill"):
+        shapes.mesh_solid(shapes.ellipsoid((1, 1, 0.0005)).rotated((1, 2, 3), 40), tets=500)
 
 
 def test_a_solid_without_bounds_is_refused():

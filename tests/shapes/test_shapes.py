@@ -10,7 +10,7 @@ from qlb import shapes
 from qlb.shapes.characters import _character
 from tests.shapes.surfaces import dihedral_angles, enclosed_volume, intersects_itself, surface_characters
 
-CHARACTERS = ["bunny", "duck"]
+CHARACTERS = ["armadillo", "bunny", "duck"]
 EULER = {"torus": [0], "shell": [2, 2]}
 
 
@@ -30,8 +30,8 @@ def test_surface_does_not_intersect_itself(shape):
 
 def test_tets_are_well_shaped(shape):
     angles = dihedral_angles(shape[1])
-    assert angles.min() >= 10.7
-    assert angles.max() <= 164.8
+    assert angles.min() >= 15
+    assert angles.max() <= 150
 
 
 def test_tets_are_positive_and_fill_the_surface(shape):
@@ -62,7 +62,8 @@ def test_characters_of_many_sizes(name, tets):
     assert len(mesh.tets) == pytest.approx(tets, rel=0.05)
     assert surface_characters(mesh) == [2]
     assert not intersects_itself(mesh)
-    assert dihedral_angles(mesh).min() >= 10.7
+    assert dihedral_angles(mesh).min() >= 12
+    assert mesh.edge_lengths().min() > 0.25 * mesh.edge_lengths().mean()
 
 
 @pytest.mark.parametrize("name", CHARACTERS)

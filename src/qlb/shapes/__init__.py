@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from qlb.mesh import TetMesh
-from qlb.shapes.characters import bunny, duck
+from qlb.shapes.characters import armadillo, bunny, duck
 from qlb.shapes.mesher import mesh_solid
 from qlb.shapes.plain import ball, box, cylinder, shell, torus
 from qlb.shapes.primitives import above, ellipsoid, ring, round_cone, rounded_box, rounded_cylinder, sphere
 from qlb.shapes.solid import Solid, smooth_minimum
 
 SHAPES: dict[str, Callable[..., TetMesh]] = {
-    function.__name__: function for function in (ball, box, bunny, cylinder, duck, shell, torus)
+    function.__name__: function for function in (armadillo, ball, box, bunny, cylinder, duck, shell, torus)
 }
 """What scene files call them."""
 
@@ -20,6 +20,7 @@ __all__ = [
     "SHAPES",
     "Solid",
     "above",
+    "armadillo",
     "ball",
     "box",
     "bunny",

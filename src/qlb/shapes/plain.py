@@ -18,7 +18,7 @@ DEFAULT_TETS = 5000
 
 def ball(radius: float = 0.1, *, tets: int | None = None, edge: float | None = None) -> TetMesh:
     """A ball of `radius` [m] about the origin, of about `tets` tets (5000 if not given) or with `edge` [m]."""
-    return mesh_solid(sphere(radius), **_size(tets, edge), name="ball")
+    return mesh_solid(sphere(radius), **_size(tets, edge), euler=2, name="ball")
 
 
 def shell(
@@ -27,7 +27,7 @@ def shell(
     """A hollow ball of outer `radius` and wall `thickness` [m] about the origin."""
     if not 0 < thickness < radius:
         raise InputError(f"shell: thickness {thickness} is out of range: > 0 m, below the radius, {radius:g} m")
-    return mesh_solid(sphere(radius) - sphere(radius - thickness), **_size(tets, edge), name="shell")
+    return mesh_solid(sphere(radius) - sphere(radius - thickness), **_size(tets, edge), euler=4, name="shell")
 
 
 def cylinder(
@@ -45,12 +45,12 @@ def cylinder(
     """
     if rounding is None:
         rounding = 0.2 * min(positive("cylinder: radius", radius), 0.5 * positive("cylinder: height", height))
-    return mesh_solid(rounded_cylinder(radius, height, rounding), **_size(tets, edge), name="cylinder")
+    return mesh_solid(rounded_cylinder(radius, height, rounding), **_size(tets, edge), euler=2, name="cylinder")
 
 
 def torus(radius: float = 0.1, tube: float = 0.04, *, tets: int | None = None, edge: float | None = None) -> TetMesh:
     """A ring about the y axis, its middle at the origin: a tube of radius `tube` around a circle of `radius` [m]."""
-    return mesh_solid(ring(radius, tube), **_size(tets, edge), name="torus")
+    return mesh_solid(ring(radius, tube), **_size(tets, edge), euler=0, name="torus")
 
 
 def box(size: Sequence[float] = (0.2, 0.2, 0.2), *, tets: int | None = None, edge: float | None = None) -> TetMesh:

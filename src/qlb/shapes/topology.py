@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from qlb.arrays import LongArray
 from qlb.mesh import TetMesh
@@ -35,6 +33,12 @@ def is_closed_surface(mesh: TetMesh) -> bool:
     return fans == len(np.unique(triangles))
 
 
+def characteristic(mesh: TetMesh) -> int:
+    """Euler characteristic V - E + F of a closed boundary: 2, less 2 for each handle, plus 2 for each cavity."""
+    triangles = mesh.boundary_triangles()
+    return len(np.unique(triangles)) - len(triangles) // 2
+
+
 def _keys(faces: LongArray, nodes: int) -> LongArray:
     """One number for each sorted triple."""
     pair = np.unique(faces[:, 0] * nodes + faces[:, 1], return_inverse=True)[1]
@@ -42,5 +46,8 @@ def _keys(faces: LongArray, nodes: int) -> LongArray:
 
 
 def _parts(count: int, a: LongArray, b: LongArray) -> int:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
     return int(connected_components(graph, directed=False, return_labels=False))
