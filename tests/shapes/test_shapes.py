@@ -110,3 +110,16 @@ def test_by_length_of_edges():
 def test_refusals(call, message):
     with pytest.raises(qlb.InputError, match=message.replace("(", r"\(")):
         call()
+
+
+@pytest.mark.parametrize("name", CHARACTERS)
+def test_thin_parts_have_nodes_inside(name):
+    # Ears and hands are not sheets of tets with every node on the surface: some node inside is high up and far out.
+    mesh = shapes.SHAPES[name]()
+    inside = np.ones(len(mesh.positions), dtype=bool)
+    inside[mesh.boundary_triangles()] = False
+    reach = np.abs(mesh.positions).max(axis=0)
+    within = np.abs(mesh.positions[inside]).max(axis=0)
+    assert (within[1:] > 0.88 * reach[1:]).all()
+    assert mesh.positions[inside, 0].max() > 0.85 * mesh.positions[:, 0].max()
+    assert mesh.positions[inside, 0].min() < 0.85 * mesh.positions[:, 0].min()

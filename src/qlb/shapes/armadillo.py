@@ -21,8 +21,8 @@ def armadillo_solid() -> Solid:
 def _trunk() -> Solid:
     belly = ellipsoid((0.058, 0.072, 0.060), (0.0, 0.125, 0.0))
     back = ellipsoid((0.058, 0.078, 0.066), (-0.018, 0.135, 0.0))
-    tail = round_cone((-0.045, 0.075, 0.0), (-0.115, 0.036, 0.0), 0.036, 0.024).smooth_union(
-        round_cone((-0.115, 0.036, 0.0), (-0.178, 0.032, 0.0), 0.024, 0.016), 0.03
+    tail = round_cone((-0.045, 0.075, 0.0), (-0.115, 0.036, 0.0), 0.036, 0.026).smooth_union(
+        round_cone((-0.115, 0.036, 0.0), (-0.172, 0.034, 0.0), 0.026, 0.021), 0.03
     )
     return belly.smooth_union(_plates(back), 0.02).smooth_union(tail, 0.04)
 
@@ -36,9 +36,9 @@ def _plates(back: Solid) -> Solid:
 
 
 def _arm() -> Solid:
-    upper = round_cone((0.0, 0.172, 0.050), (0.042, 0.172, 0.094), 0.026, 0.021)
-    lower = round_cone((0.042, 0.172, 0.094), (0.078, 0.215, 0.098), 0.021, 0.019)
-    hand = ellipsoid((0.022, 0.026, 0.022), (0.084, 0.226, 0.098))
+    upper = round_cone((0.0, 0.172, 0.050), (0.042, 0.172, 0.094), 0.027, 0.023)
+    lower = round_cone((0.042, 0.172, 0.094), (0.078, 0.215, 0.098), 0.023, 0.0215)
+    hand = ellipsoid((0.025, 0.028, 0.025), (0.084, 0.226, 0.098))
     return upper.smooth_union(lower, 0.015).smooth_union(hand, 0.010)
 
 
@@ -52,8 +52,8 @@ def _leg() -> Solid:
 def _head() -> Solid:
     neck = round_cone((-0.002, 0.185, 0.0), (0.016, 0.225, 0.0), 0.042, 0.036)
     skull = ellipsoid((0.046, 0.040, 0.042), (0.024, 0.243, 0.0))
-    snout = round_cone((0.045, 0.236, 0.0), (0.096, 0.222, 0.0), 0.028, 0.016)
-    ear = ellipsoid((0.015, 0.034, 0.020), (0, 0.022, 0)).rotated((0, 0, 1), 12).rotated((1, 0, 0), 28)
+    snout = round_cone((0.045, 0.236, 0.0), (0.092, 0.222, 0.0), 0.030, 0.020)
+    ear = ellipsoid((0.019, 0.034, 0.023), (0, 0.022, 0)).rotated((0, 0, 1), 12).rotated((1, 0, 0), 28)
     eye = sphere(0.011, (0.055, 0.258, 0.026))
     head = skull.smooth_union(snout, 0.025).smooth_union(ear.moved((0.004, 0.262, 0.026)), 0.014)
     return neck.smooth_union(head, 0.02).smooth_union(eye, 0.005)

@@ -31,11 +31,11 @@ def _body() -> Solid:
 
 def _head() -> Solid:
     ear = (
-        ellipsoid((0.024, 0.066, 0.029), (0, 0.048, 0))
-        .smooth_union(sphere(0.024), 0.02)
+        ellipsoid((0.026, 0.066, 0.031), (0, 0.048, 0))
+        .smooth_union(sphere(0.026), 0.02)
         .rotated((0, 0, 1), 24)
         .rotated((1, 0, 0), 15)
-        .moved((0.036, 0.206, 0.029))
+        .moved((0.036, 0.206, 0.031))
     )
     return (
         ellipsoid((0.062, 0.056, 0.058), (0.058, 0.170, 0.0))

@@ -14,8 +14,8 @@ from qlb.shapes.primitives import positive
 from qlb.shapes.solid import Solid
 
 _CHARACTERS: dict[str, tuple[Callable[[], Solid], float]] = {
-    "armadillo": (armadillo_solid, 0.312),
-    "bunny": (bunny_solid, 0.3077),
+    "armadillo": (armadillo_solid, 0.3124),
+    "bunny": (bunny_solid, 0.3079),
     "duck": (duck_solid, 0.25),
 }
 """The solid, and how tall it is [m]."""
