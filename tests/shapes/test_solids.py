@@ -98,6 +98,12 @@ def test_mirrored(points):
     both = shapes.sphere(0.3, (0, 0, 0.5)) | shapes.sphere(0.3, (0, 0, -0.5))
     assert np.allclose(solid(points), both(points))
     assert np.array_equal(solid.low, [-0.3, -0.3, -0.8])
+    # With a radius the two halves meet without a crease: no slope across the plane, where there was one.
+    step = np.array([[0.2, 0.1, 0.0], [0.2, 0.1, 1e-6]])
+    assert np.diff(solid(step))[0] < -1e-7
+    smooth_halves = shapes.sphere(0.3, (0, 0, 0.5)).mirrored(0.02)
+    assert abs(np.diff(smooth_halves(step))[0]) < 1e-9
+    assert np.allclose(smooth_halves(points * (1, 1, -1)), smooth_halves(points))
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from qlb.shapes.solid import Solid
 
 _CHARACTERS: dict[str, tuple[Callable[[], Solid], float]] = {
     "armadillo": (armadillo_solid, 0.3124),
-    "bunny": (bunny_solid, 0.3079),
-    "duck": (duck_solid, 0.25),
+    "bunny": (bunny_solid, 0.3055),
+    "duck": (duck_solid, 0.2492),
 }
 """The solid, and how tall it is [m]."""
 DEFAULT_TETS = 8000

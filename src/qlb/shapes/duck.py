@@ -7,7 +7,7 @@ from qlb.shapes.solid import Solid
 
 
 def duck_solid() -> Solid:
-    """The duck, 0.25 m tall; the soft parts are thick enough for 8000 tets [m]."""
+    """The duck, about 0.25 m tall; its thin parts are thick enough for 8000 tets [m]."""
     trunk = (
         ellipsoid((0.112, 0.070, 0.086), (0.0, 0.056, 0.0))
         .smooth_union(sphere(0.064, (0.050, 0.076, 0.0)), 0.06)
@@ -27,7 +27,7 @@ def duck_solid() -> Solid:
         trunk.smooth_union(sphere(0.065, (0.060, 0.185, 0.0)), 0.02)
         .smooth_union(wing, 0.02)
         .smooth_union(bill, 0.014)
-        .smooth_union(sphere(0.016, (0.1025, 0.2105, 0.031)), 0.005)
-        .mirrored()
+        .smooth_union(sphere(0.0175, (0.1025, 0.2105, 0.0325)), 0.010)
+        .mirrored(0.010)
         .smooth_intersection(above(0.0), 0.012)
     )

@@ -54,7 +54,7 @@ def round_cone(start: Sequence[float], end: Sequence[float], start_radius: float
     cosine, axis = np.sqrt(1 - sine**2), (b - a) / length
 
     def function(x: FloatArray) -> FloatArray:
-        u = (x - a) @ axis
+        u = np.einsum("ij,j->i", x - a, axis)
         v = _norm(x - a - u[:, None] * axis)
         along = u * cosine - v * sine  # of the foot of the perpendicular on the side
         side = u * sine + v * cosine - ra

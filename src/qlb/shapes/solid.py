@@ -73,18 +73,23 @@ class Solid:
         R, function = _rotation(vectors("axis", axis, (3,)), np.radians(degrees)), self.function
         centre, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         middle, reach = R @ centre, np.abs(R) @ half
-        return Solid(lambda x: function(x @ R), middle - reach, middle + reach)
+        # Not by BLAS, whose bits may depend on its threads.
+        return Solid(lambda x: function(np.einsum("ij,jk->ik", x, R)), middle - reach, middle + reach)
 
     def scaled(self, factor: float) -> Solid:
         """The solid `factor` times as large, about the origin."""
         s, function = _at_least("factor", factor, 1e-12), self.function
         return Solid(lambda x: s * function(x / s), s * self.low, s * self.high)
 
-    def mirrored(self) -> Solid:
-        """The half z >= 0 of the solid, and its mirror image in the plane z = 0."""
+    def mirrored(self, radius: float = 0.0) -> Solid:
+        """The half z >= 0 of the solid, and its mirror image in the plane z = 0.
+
+        With a `radius` r [m], |z| is taken as sqrt(z^2 + r^2), so that both halves meet smoothly.
+        """
         function, reach = self.function, self.high[2]
+        r = _at_least("radius", radius, 0.0)
         low, high = np.append(self.low[:2], -reach), np.append(self.high[:2], reach)
-        return Solid(lambda x: function(np.column_stack([x[:, :2], np.abs(x[:, 2])])), low, high)
+        return Solid(lambda x: function(np.column_stack([x[:, :2], np.hypot(x[:, 2], r)])), low, high)
 
 
 def smooth_minimum(a: FloatArray, b: FloatArray, radius: float) -> FloatArray:
