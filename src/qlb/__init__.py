@@ -7,6 +7,7 @@ from importlib.metadata import version as _version
 # before the OpenMP runtime is loaded; a value that the user has set wins.
 _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
+from qlb import shapes
 from qlb.bodies import Body, Obstacle, Placement, Plane
 from qlb.contact import Contact, ContactPair
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
@@ -72,4 +73,5 @@ __all__ = [
     "Translation",
     "VertexAnimation",
     "__version__",
+    "shapes",
 ]
