@@ -9,7 +9,7 @@ _os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from qlb import shapes
 from qlb.bodies import Body, Obstacle, Placement, Plane
-from qlb.contact import Contact, ContactPair
+from qlb.contact import Contact, ContactPair, ContactReport
 from qlb.energies import Damping, Energy, NodalEnergy, PointForce, Pressure, StencilEnergy, Traction
 from qlb.errors import InputError, QlbError, QlbWarning
 from qlb.fields import TimeExpression, TimeTable
@@ -26,8 +26,9 @@ from qlb.materials import (
     SymbolicMaterial,
 )
 from qlb.mesh import TetMesh
-from qlb.simulation import Simulation, StepFailed, StepResult
+from qlb.simulation import Simulation
 from qlb.solvers import Reason, SolverSettings, Tolerance
+from qlb.step_result import StepFailed, StepResult
 from qlb.system import Keyframes, Rotation, Translation, VertexAnimation
 
 __version__ = _version("qlb")
@@ -38,6 +39,7 @@ __all__ = [
     "CompressibleNeoHookean",
     "Contact",
     "ContactPair",
+    "ContactReport",
     "Damping",
     "Energy",
     "Fibres",

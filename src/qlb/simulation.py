@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -14,12 +14,14 @@ from qlb.arrays import FloatArray, IntArray, vectors
 from qlb.bodies import Body, Obstacle, Plane
 from qlb.bodies.assembly import assemble
 from qlb.contact import Contact
+from qlb.contact.report import ContactReport
 from qlb.energies import Acceleration, Damping, Energy
-from qlb.errors import InputError, QlbError
+from qlb.errors import InputError
 from qlb.integrators import INTEGRATORS, Integrator, Origin, State
 from qlb.materials import Fibres, Material
 from qlb.mesh.tet_mesh import TetMesh
-from qlb.solvers import SOLVERS, Descent, Reason, SolveResult, SolverSettings, Tolerance
+from qlb.solvers import SOLVERS, Descent, SolveResult, SolverSettings, Tolerance
+from qlb.step_result import StepFailed, StepResult, failure_message
 from qlb.system import HeldNodes, Motion, StageProblem, System
 from qlb.system.system import MassKind
 from qlb.timing import Timer
@@ -27,57 +29,6 @@ from qlb.timing import Timer
 T = TypeVar("T")
 OnFailure = Literal["stop", "halve", "accept"]
 MAX_HALVINGS = 8
-
-
-@dataclass(frozen=True)
-class StepResult:
-    """One time step."""
-
-    step: int
-    """1 for the first"""
-    time: float
-    """at the end of the step [s]"""
-    positions: FloatArray
-    """[m], shape (n, 3); with obstacles (n + q, 3), those of their vertices behind those of the bodies"""
-    velocities: FloatArray
-    """[m/s], of the same shape"""
-    solves: list[SolveResult] = field(repr=False)
-    """one for each stage, or for each stage of each part of a step that was cut"""
-    parts: int = 1
-    """1, or how many pieces the step was cut into because the whole did not converge"""
-
-    @property
-    def converged(self) -> bool:
-        """Whether every solve that led to `positions` met the tolerance."""
-        return self.reason.converged
-
-    @property
-    def reason(self) -> Reason:
-        """Why the last solve ended, or the first that failed (of the pieces, where the step was cut)."""
-        used = self.solves[-1:] if self.parts > 1 else self.solves
-        return next((s.reason for s in used if not s.reason.converged), self.solves[-1].reason)
-
-    @property
-    def iterations(self) -> int:
-        """Nonlinear iterations of all solves."""
-        return sum(solve.iterations for solve in self.solves)
-
-    @property
-    def factorizations(self) -> int:
-        """Cholesky factorisations of all solves."""
-        return sum(solve.factorizations for solve in self.solves)
-
-
-class StepFailed(QlbError, RuntimeError):
-    """A time step did not converge.
-
-    Attributes:
-        result: the failed step; its state was not taken over by the simulation.
-    """
-
-    def __init__(self, message: str, result: StepResult) -> None:
-        super().__init__(message)
-        self.result = result
 
 
 class Simulation:
@@ -295,20 +246,38 @@ class Simulation:
         """Take one time step.
 
         Raises:
-            StepFailed: the step did not converge and `on_failure` is not "accept". The state stays as it was.
+            StepFailed: the step did not converge and `on_failure` is not "accept"; or it ends in an intersection, and
+                `contact.check` asks for none. The state stays as it was.
         """
         state, solves = self._take(self._integrator, self._state, self.step)
         parts = 1
         if self.on_failure == "halve" and not all(s.reason.converged for s in solves):
             state, solves, parts = self._take_halves(self._state, self.step, solves)
         step = self._steps_done + 1
-        result = StepResult(step, state.time, state.positions, state.velocities, solves, parts)
+        result = StepResult(
+            step, state.time, state.positions, state.velocities, solves, self._contact_report(solves[-1]), parts
+        )
         if not result.converged and (self.on_failure != "accept" or not _finite(state)):
-            raise StepFailed(_failure_message(result, self.solver.name), result)
+            raise StepFailed(failure_message(result, self.solver.name), result)
+        self._check_contact(result)
         last = self._state
         self._state = replace(state, time=last.time + self.step, previous=last.without_history())
         self._steps_done = step
         return result
+
+    def _contact_report(self, solve: SolveResult) -> ContactReport | None:
+        point, forces = solve.contact, solve.forces
+        if point is None or forces is None:
+            return None
+        return ContactReport(forces.nodes, point.count, point.minimum_distance, forces.planes, self.assembly)
+
+    def _check_contact(self, result: StepResult) -> None:
+        """Raise `StepFailed` where the settings of contact ask for a check, and something passes through something."""
+        model = self.system.contact
+        if model is not None and model.settings.check:
+            found = model.intersection(result.positions, result.time)
+            if found is not None:
+                raise StepFailed(f"step {result.step} (time {result.time:g} s) intersects: {found}", result)
 
     def _take(self, integrator: Integrator, state: State, h: float) -> tuple[State, list[SolveResult]]:
         """One step of `h`; stops at the first stage that fails, unless failed steps are to be accepted."""
@@ -355,15 +324,6 @@ def available_threads() -> int:
 
 def _finite(state: State) -> bool:
     return bool(np.isfinite(state.positions).all() and np.isfinite(state.velocities).all())
-
-
-def _failure_message(result: StepResult, solver: str) -> str:
-    solve = next((s for s in result.solves if not s.reason.converged), result.solves[-1])
-    relative = solve.residual / solve.reference if solve.reference else float("inf")
-    return (
-        f"step {result.step} (time {result.time:g} s) did not converge: {result.reason.value} after"
-        f" {solve.iterations} iterations of {solver}, |g| = {solve.residual:.3g} ({relative:.3g} of |g(x_k)|)"
-    )
 
 
 def _choose(what: str, name: str, choices: dict[str, type[T]]) -> type[T]:

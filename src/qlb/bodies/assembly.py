@@ -101,6 +101,13 @@ class Assembly:
                 return group
         raise InputError(f"{type(which).__name__} is not among the bodies and obstacles of this simulation")
 
+    @cached_property
+    def labels(self) -> list[str]:
+        """What each group, then each plane is called: its name, or its kind and number, as "plane 0"."""
+        labels = [body.name or f"body {k}" for k, body in enumerate(self.bodies)]
+        labels += [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(self.obstacles)]
+        return labels + [plane.name or f"plane {k}" for k, plane in enumerate(self.planes)]
+
     def nodes_of(self, which: int | str | Body | Obstacle) -> IntArray:
         """Nodes of a body or obstacle, shape (k,); see `group_of`."""
         begin, end = self.node_begin[self.group_of(which) :][:2]

@@ -16,7 +16,7 @@ from rich.progress import (
 )
 
 from qlb.cli.output import console, errors
-from qlb.simulation import StepResult
+from qlb.step_result import StepResult
 
 
 class StepReporter:

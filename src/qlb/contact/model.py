@@ -86,9 +86,7 @@ class ContactModel:
         """Whether anything slides with friction."""
         return bool(self.friction.any())
 
-    def evaluate(
-        self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray
-    ) -> _native.ContactSet:
+    def evaluate(self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray) -> _native.ContactSet:
         """The contacts at `x` (n, 3) [m] among the candidates; `scale` dPhi/dx is added to `gradient` (n, 3)."""
         planes = np.column_stack([self.normals, offsets])
         pairs = self.candidates.vertex_faces, self.candidates.edge_edges
@@ -103,6 +101,10 @@ class ContactModel:
         """Distances [m] of `vertices` from each plane, shape (v, q); infinite where they may not touch."""
         gaps = x[self.vertices] @ self.normals.T - offsets
         return np.where(self._near_planes, gaps, np.inf)
+
+    def plane_of(self, contacts: _native.ContactSet) -> IntArray:
+        """The plane of each contact, or a negative number for one between two surfaces, shape (k,)."""
+        return np.asarray(contacts.groups[:, 1] - self.plane_allowed.shape[1])
 
     def describe(self, node: int) -> str:
         """A node by its body or obstacle."""
@@ -142,7 +144,7 @@ class ContactModel:
 
         Else a body would be strained by itself at rest. Warns where dhat was set by the user.
         """
-        rest, groups = self.around.rest, self.around.groups
+        rest = self.around.rest
         self.candidates.build(rest, np.zeros_like(rest), 0.0, self.dhat)
         far_away = np.full(len(self.normals), -np.inf)
         near = self.evaluate(rest, far_away, 1.0, np.zeros_like(rest))

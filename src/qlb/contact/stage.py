@@ -8,7 +8,9 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray, IntArray
+from qlb.contact.friction import LaggedFriction
 from qlb.contact.model import ContactModel
+from qlb.contact.report import ContactForces
 from qlb.integrators.integrator import Origin, Stage
 from qlb.timing import Timer
 
@@ -57,7 +59,7 @@ class StageContact:
         self.model, self._stage, self._scale, self._timer = model, stage, scale, timer
         self._from, self._to = model.offsets(origin.time), model.offsets(stage.time)
         self._offsets = self._from
-        self._friction: _native.Friction | None = None
+        self._friction: LaggedFriction | None = None
         self.friction_pass = 1
         if model.has_friction:
             self._lag_friction(origin.positions)
@@ -86,22 +88,7 @@ class StageContact:
     def _lag_friction(self, x: FloatArray) -> None:
         """Take normal forces and directions of sliding at positions `x` (n, 3) [m]."""
         self._friction = None
-        model, contacts = self.model, self.at(x).contacts
-        mu = model.friction[contacts.groups[:, 0], contacts.groups[:, 1]]
-        slides = np.flatnonzero(mu * contacts.force > 0)
-        if len(slides):
-            groups = contacts.groups[slides, 1] - model.plane_allowed.shape[1]
-            on_plane = groups >= 0
-            slip = np.zeros((len(slides), 3))
-            slip[on_plane] = self._plane_motion()[groups[on_plane]]
-            self._friction = _native.Friction(
-                contacts.nodes[slides],
-                contacts.gamma[slides],
-                contacts.normal[slides],
-                contacts.force[slides] / self._scale,
-                mu[slides],
-                slip,
-            )
+        self._friction = LaggedFriction(self.model, self.at(x).contacts, self._scale, self._plane_motion())
 
     def at(self, x: FloatArray) -> ContactPoint:
         """Contact at positions `x` (n, 3) [m]."""
@@ -110,11 +97,29 @@ class StageContact:
         with self._timer.section("contact"):
             gradient = np.zeros_like(x)
             contacts = model.evaluate(x, self._offsets, self._scale, gradient)
-            if self._friction is None:
+            friction = None if self._friction is None else self._friction.whole
+            if friction is None:
                 return ContactPoint(contacts.energy, gradient, contacts)
-            epsilon = model.friction_velocity * self._stage.c
-            friction = self._friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
-            return ContactPoint(contacts.energy + friction.energy, gradient, contacts, friction)
+            terms = self._slide(friction, x, gradient)
+            return ContactPoint(contacts.energy + terms.energy, gradient, contacts, terms)
+
+    def forces(self, x: FloatArray, point: ContactPoint) -> ContactForces:
+        """Forces at positions `x` (n, 3) [m], where contact was found to be `point`."""
+        model, scale = self.model, self._scale
+        contacts, plane = point.contacts, model.plane_of(point.contacts)
+        planes = np.zeros((len(model.normals), 3))
+        np.add.at(planes, plane[plane >= 0], -contacts.force[plane >= 0, None] * contacts.normal[plane >= 0])
+        for q, total in enumerate(planes):
+            friction = None if self._friction is None else self._friction.on_plane(q)
+            if friction is not None:
+                gradient = np.zeros_like(x)
+                self._slide(friction, x, gradient)
+                total += gradient.sum(axis=0)
+        return ContactForces(-point.gradient / scale, planes / scale)
+
+    def _slide(self, friction: _native.Friction, x: FloatArray, gradient: FloatArray) -> _native.FrictionTerms:
+        epsilon = self.model.friction_velocity * self._stage.c
+        return friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
 
     def cover(self, x: FloatArray, p: FloatArray | None) -> None:
         """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""

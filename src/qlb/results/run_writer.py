@@ -23,7 +23,8 @@ from qlb.results.errors import WriteError
 from qlb.results.files import append_text, write_arrays, write_text
 from qlb.results.parts import Parts
 from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
-from qlb.simulation import Simulation, StepFailed, StepResult
+from qlb.simulation import Simulation
+from qlb.step_result import StepFailed, StepResult
 
 Status = Literal["running", "complete", "failed", "interrupted"]
 

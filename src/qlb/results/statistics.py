@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from qlb.errors import InputError
-from qlb.simulation import StepResult
 from qlb.solvers import IterationRow, Reason, SolveResult
+from qlb.step_result import StepResult
 
 _SECONDS = {
     "gradient": "energy with gradient",

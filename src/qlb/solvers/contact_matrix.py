@@ -8,7 +8,7 @@ from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, IntArray
 from qlb.contact.stage import ContactPoint
 from qlb.system import System
-from qlb.system.system import CholeskyKind
+from qlb.system.system import CholeskyKind, Precision
 
 REORDER = 0.02
 """Part of the nodes in contact from which on the order of elimination of the bodies alone is no longer good enough."""
@@ -43,14 +43,15 @@ class ContactMatrix:
         model = self._system.contact
         assert model is not None
         blocks = model.barrier.hessian_blocks(x, contact.contacts, True)
-        nodes, blocks = self._onto_free(contact.contacts.nodes, blocks)
-        missing = ~self._holds(nodes)
-        if missing.any():
+        parts = [self._onto_free(contact.contacts.nodes, blocks)]
+        if contact.friction is not None:  # of contacts that were, which need not be contacts now
+            parts.append(self._onto_free(contact.friction.nodes, _blocks(contact.friction)))
+        nodes = np.concatenate([nodes for nodes, _ in parts])
+        if not self._holds(nodes).all():
             self._extend(nodes)
         self._matrix.set_from(self._map, elastic)
-        self._matrix.add_stencils(nodes, blocks)
-        if contact.friction is not None:
-            self._matrix.add_stencils(*self._onto_free(contact.friction.nodes, _blocks(contact.friction)))
+        for stencils, hessians in parts:
+            self._matrix.add_stencils(stencils, hessians)
         return self._matrix
 
     def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -79,7 +80,7 @@ class ContactMatrix:
         self._keys = _keys(self._pattern)
         touching = len(np.unique(self._stencils))
         order = self._order if touching < REORDER * system.nodes else None
-        precision = getattr(self.cholesky, "precision", "float64")
+        precision: Precision = getattr(self.cholesky, "precision", "float64")
         self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
         self._map = _native.PatternMap(system.pattern, self._pattern)
         self._matrix = _native.BlockMatrix(self._pattern)

@@ -76,6 +76,8 @@ class Descent(ABC):
                 break
             problem, iterations = refreshed, result.iterations
             result = self.minimise(problem, result)
+        if problem.contact is not None and result.contact is not None:
+            result = replace(result, forces=problem.contact.forces(result.positions, result.contact))
         return result
 
     def _solve_with_contact(self, problem: StageProblem) -> SolveResult:

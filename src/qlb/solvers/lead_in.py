@@ -75,7 +75,7 @@ class LeadIn:
         limiting = self._contact.model.candidates.limiting
         between = ""
         if limiting is not None:
-            nodes = list(dict.fromkeys(self._contact.model.describe(int(node)) for node in limiting))
+            nodes = list(dict.fromkeys(self._contact.model.describe(int(node)) for node in np.asarray(limiting)))
             between = f" between {', '.join(nodes)}"
         point = result.contact
         gap = point.minimum_distance if point is not None else np.inf

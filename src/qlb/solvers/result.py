@@ -7,6 +7,7 @@ from enum import Enum
 from math import inf
 
 from qlb.arrays import FloatArray
+from qlb.contact.report import ContactForces
 from qlb.contact.stage import ContactPoint
 
 
@@ -68,6 +69,8 @@ class SolveResult:
     rows: list[IterationRow] = field(default_factory=list)
     contact: ContactPoint | None = None
     """contact at `positions`"""
+    forces: ContactForces | None = None
+    """of contact and friction at `positions`"""
     detail: str = ""
     """more about a failure, in words"""
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from qlb.errors import QlbError
 from qlb.scenes import SCENES
-from qlb.simulation import StepResult
+from qlb.step_result import StepResult
 from qlb.studies.run import run_scene
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from qlb.results import Run, RunWriter
 from qlb.scenes import Scene
-from qlb.simulation import StepFailed, StepResult
+from qlb.step_result import StepFailed, StepResult
 
 
 @dataclass(frozen=True)

@@ -215,11 +215,8 @@ class System:
 
 
 def _surroundings(whole: Assembly, young: float, threads: int) -> Surroundings:
-    names = [body.name or f"body {k}" for k, body in enumerate(whole.bodies)]
-    names += [obstacle.name or f"obstacle {k}" for k, obstacle in enumerate(whole.obstacles)]
-    names += [plane.name or f"plane {k}" for k, plane in enumerate(whole.planes)]
     rest, faces = whole.system_mesh.positions, whole.surface_faces
-    return Surroundings(rest, faces, whole.groups, len(whole.bodies), names, whole.planes, young, threads)
+    return Surroundings(rest, faces, whole.groups, len(whole.bodies), whole.labels, whole.planes, young, threads)
 
 
 def _cliques(mesh: TetMesh, energies: Sequence[Energy]) -> IntArray:
