@@ -48,8 +48,8 @@ class Descent(ABC):
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """The search direction p at a point, shape (n, 3), and the slope g.p along it."""
 
-    def accept(self, old: Point, new: Point) -> None:
-        """Learn from an accepted step."""
+    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+        """Learn from an accepted step, which contact may have `limited`."""
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
         """After a failed search: change something so that `direction` differs; False when nothing is left to try."""
@@ -138,7 +138,7 @@ class Descent(ABC):
                 log.add(old, 0.0)
                 return found
             step_length, new, longest = found
-            self.accept(old, new)
+            self.accept(old, new, limited=longest < 1)
             log.add(new, step_length, longest)
             reason = _converged(new, *goals)
         return reason
