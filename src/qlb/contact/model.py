@@ -76,6 +76,11 @@ class ContactModel:
         if self.is_barrier:
             self._limit_features()
 
+    def resolved(self) -> dict[str, str | float]:
+        """What the settings have come to, as plain data."""
+        names = ("dhat", "stiffness", "friction_velocity")
+        return {"mode": self.settings.mode, **{name: float(getattr(self, name)) for name in names}}
+
     @property
     def is_barrier(self) -> bool:
         """Whether nothing may pass through anything."""

@@ -24,8 +24,12 @@ Terms = tuple[IntArray, FloatArray, FloatArray]
 
 def joined(first: Terms, second: Terms) -> Terms:
     """Both sums as one."""
-    nodes, vectors, stiffness = (np.concatenate(parts) for parts in zip(first, second, strict=True))
-    return nodes, vectors, stiffness
+    (nodes, vectors, stiffness), (others, more_vectors, more_stiffness) = first, second
+    return (
+        np.concatenate([nodes, others]),
+        np.concatenate([vectors, more_vectors]),
+        np.concatenate([stiffness, more_stiffness]),
+    )
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from qlb.results.errors import MissingExtra, RenderingFailed, WriteError
 from qlb.results.figure import FigureGrid, write_figure
 from qlb.results.figure_page import FigureRow, figure_rows, write_figures_page
 from qlb.results.picture import render_frames
-from qlb.results.plots import plot_iterations, plot_residuals, plot_seconds
+from qlb.results.plots import plot_contact, plot_iterations, plot_residuals, plot_seconds
 from qlb.results.report import finish_run, write_comparison, write_report
 from qlb.results.run import Frame, Run, StepIterations
 from qlb.results.run_writer import RunWriter
@@ -23,6 +23,7 @@ __all__ = [
     "WriteError",
     "figure_rows",
     "finish_run",
+    "plot_contact",
     "plot_iterations",
     "plot_residuals",
     "plot_seconds",

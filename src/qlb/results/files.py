@@ -86,6 +86,12 @@ def read_arrays(path: Path, needed: Mapping[str, tuple[int | None, ...]]) -> Arr
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path} is damaged or not an npz file: {reason}") from None
+    require_shapes(path, arrays, needed)
+    return arrays
+
+
+def require_shapes(path: Path, arrays: Arrays, needed: Mapping[str, tuple[int | None, ...]]) -> None:
+    """Raise `InputError` where one of `needed` is missing in what was read from `path`, or has another shape."""
     for name, shape in needed.items():
         if name not in arrays:
             raise InputError(f"{path} is not what it should be: it has no array '{name}'")
@@ -93,7 +99,6 @@ def read_arrays(path: Path, needed: Mapping[str, tuple[int | None, ...]]) -> Arr
         if len(found) != len(shape) or any(n is not None and n != m for n, m in zip(shape, found, strict=True)):
             wanted = str(shape).replace("None", "n")
             raise InputError(f"{path} is not what it should be: '{name}' has shape {found}, must be {wanted}")
-    return arrays
 
 
 def _remove(path: Path) -> None:

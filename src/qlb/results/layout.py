@@ -8,7 +8,9 @@ Format version 1::
                         groups (n + q,), body_names; obstacle_names, obstacle_vertices [m] (q, 3) at rest,
                         obstacle_triangles (t, 3); planes (p, 6), a point [m] and the normal of each
     frames/000000.npz   step, time [s], positions [m] (n + q, 3), velocities [m/s] (n + q, 3), those of obstacles last;
-                        plane_points [m] (p, 3) where there are planes; named by the step
+                        plane_points [m] (p, 3) where there are planes; with contact, but for the first frame of a
+                        run, contact_forces on each node [N] (n + q, 3) and the total on each plane, plane_forces [N]
+                        (p, 3); named by the step
     stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
     checkpoint.npz      what a run needs to go on to the same bits, as of the last frame
     summary.json        the run in numbers; its status is "running" until the end
@@ -41,7 +43,7 @@ STATS = "stats.csv"
 CHECKPOINT = "checkpoint.npz"
 SUMMARY = "summary.json"
 REPORT = "report.html"
-FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals", "seconds")}
+FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals", "contact", "seconds")}
 """Images of a run, by the name that `finish_run` gives them, in the order of the report."""
 
 _FRAME = re.compile(r"(\d{6,})\.npz")

@@ -147,6 +147,37 @@ def _residual_lines(stats: Statistics) -> tuple[list[FloatArray], LongArray, lis
     return lines, np.array(steps, np.int64), failed
 
 
+def plot_contact(run: Run, path: Path) -> None:
+    """Contacts at the end of each step, and the smallest distance between what touches.
+
+    Writes PNG or SVG, as the suffix of `path` says. Raises `WriteError`.
+    """
+    stats = run.stats
+    last = np.flatnonzero(np.diff(stats["step"], append=-1))
+    steps, nearest = stats["step"][last], stats["minimum_distance"][last]
+    with style.look():
+        figure = style.figure(8.0, 4.4)
+        count, distance = figure.subplots(2, 1, sharex=True)
+        count.step(steps, stats["contacts"][last], where="mid", color=style.BLUE)
+        count.set_title("Contact at the end of each step")
+        count.set_ylabel("contacts")
+        count.set_ylim(bottom=0)
+        count.yaxis.set_major_locator(_whole_numbers())
+        touches = np.isfinite(nearest) & (nearest > 0)
+        distance.plot(steps[touches], nearest[touches], ".", color=style.BLUE, markersize=4)
+        dhat = (run.summary.get("contact") or {}).get("dhat")
+        if dhat:
+            distance.axhline(dhat, color=style.INK, linewidth=1, linestyle="--", label=f"dhat = {dhat:.3g} m")
+            distance.legend(loc="lower right", fontsize=9)
+        if touches.any() or dhat:
+            distance.set_yscale("log")
+        distance.set_ylabel("smallest distance [m]")
+        distance.set_xlabel("time step")
+        distance.xaxis.set_major_locator(_whole_numbers())
+        distance.margins(x=0.02)
+        style.save(figure, path)
+
+
 def plot_seconds(run: Run, path: Path) -> None:
     """Where the time went: parts of the whole time loop as one bar, and of each step over the steps.
 
@@ -158,7 +189,7 @@ def plot_seconds(run: Run, path: Path) -> None:
         _draw_total(total, run.summary["seconds"])
         _draw_steps(each, run.stats)
         handles, labels = each.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(PARTS), fontsize=9)
+        figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)), fontsize=9)
         style.save(figure, path)
 
 
@@ -180,10 +211,12 @@ def _draw_total(ax: Axes, seconds: Mapping[str, float]) -> None:
 
 def _draw_steps(ax: Axes, stats: Statistics) -> None:
     steps, inverse = np.unique(stats["step"], return_inverse=True)
-    parts = [1e3 * np.bincount(inverse, stats[f"seconds_{part}"], len(steps)) for part in PARTS]
+    parts = {part: 1e3 * np.bincount(inverse, stats[f"seconds_{part}"], len(steps)) for part in PARTS}
     width = 1.0 if len(steps) > 60 else 0.9
     bottom = np.zeros(len(steps))
-    for part, height in zip(PARTS, parts, strict=True):
+    for part, height in parts.items():
+        if not height.any() and part in ("contact", "candidates"):
+            continue
         ax.bar(steps, height, width, bottom=bottom, color=style.PARTS[part], label=_NAMES.get(part, part), linewidth=0)
         bottom += height
     _clip(ax, steps, bottom)

@@ -18,7 +18,7 @@ from qlb.results import layout
 from qlb.results.errors import MissingExtra, RenderingFailed
 from qlb.results.files import write_text
 from qlb.results.picture import render_frames
-from qlb.results.plots import plot_iterations, plot_residuals, plot_seconds
+from qlb.results.plots import plot_contact, plot_iterations, plot_residuals, plot_seconds
 from qlb.results.run import Run
 from qlb.results.statistics import failures
 
@@ -26,12 +26,14 @@ _TITLES = {
     "picture": "The run",
     "iterations": "Nonlinear iterations",
     "residuals": "Convergence",
+    "contact": "Contact",
     "seconds": "Time",
 }
 _ALT = {
     "picture": "The deformed bodies at chosen times",
     "iterations": "Nonlinear iterations over time steps",
     "residuals": "Relative residual over nonlinear iterations, one line for each solve",
+    "contact": "Contacts and the smallest distance between what touches, over time steps",
     "seconds": "Seconds by part of a step, in total and over time steps",
 }
 _COLUMNS = {
@@ -67,6 +69,8 @@ def finish_run(directory: Path, *, picture: bool = True) -> dict[str, Path]:
             missing["picture"] = str(error)
     plot_iterations({_title(run): run}, paths["iterations"])
     plot_residuals(run, paths["residuals"])
+    if run.summary.get("contact") is not None:
+        plot_contact(run, paths["contact"])
     plot_seconds(run, paths["seconds"])
     files = {name: path for name, path in paths.items() if path.exists()}
     return files | {"report": write_report(run, missing)}
@@ -211,12 +215,26 @@ def _statistics(s: Mapping[str, Any]) -> dict[str, str]:
         "factorizations": s["factorizations"],
         "wall time of the time loop": f"{s['wall_seconds']:.4g} s",
         "CPU time of the time loop": f"{s['cpu_seconds']:.4g} s",
+        **_contact_rows(s),
         **{f"wall time, {part}": f"{seconds:.4g} s" for part, seconds in s["seconds"].items()},
         "nodes": s["nodes"],
         "tetrahedra": s["tets"],
         "threads": s["threads"],
     }
     return {name: str(value) for name, value in rows.items()}
+
+
+def _contact_rows(s: Mapping[str, Any]) -> dict[str, str]:
+    """What contact came to, where there is any."""
+    contact, nearest = s.get("contact"), s.get("minimum_distance")
+    if contact is None:
+        return {}
+    return {
+        "smallest distance of what touched": "nothing touched" if nearest is None else f"{nearest:.4g} m",
+        "distance at which contact begins, dhat": f"{contact['dhat']:.4g} m",
+        "contact stiffness": f"{contact['stiffness']:.4g} Pa",
+        "friction velocity": f"{contact['friction_velocity']:.4g} m/s",
+    }
 
 
 def flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

@@ -18,7 +18,7 @@ from qlb.integrators import State
 from qlb.mesh import TetMesh
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
-from qlb.results.files import read_arrays
+from qlb.results.files import read_arrays, require_shapes
 from qlb.results.parts import Parts
 from qlb.results.statistics import Statistics, count_steps, read_statistics, summarise
 
@@ -36,6 +36,10 @@ class Frame:
     """[m/s], of the same shape"""
     plane_points: FloatArray
     """a point on each plane [m], shape (p, 3)"""
+    contact_forces: FloatArray | None = None
+    """of contact and friction on each node [N], shape (n + q, 3), where there is contact and a step has been taken"""
+    plane_forces: FloatArray | None = None
+    """their total on each plane [N], shape (p, 3)"""
 
 
 class StepIterations(NamedTuple):
@@ -104,8 +108,21 @@ class Run:
         shapes |= {"positions": (nodes, 3), "velocities": (nodes, 3)}
         shapes |= {"plane_points": (planes, 3)} if planes else {}
         arrays = read_arrays(path, shapes)
-        points = arrays["plane_points"] if planes else np.empty((0, 3))
-        return Frame(int(arrays["step"]), float(arrays["time"]), arrays["positions"], arrays["velocities"], points)
+        forces = arrays.get("contact_forces")
+        if forces is not None:
+            require_shapes(
+                path, arrays, {"contact_forces": (nodes, 3)} | ({"plane_forces": (planes, 3)} if planes else {})
+            )
+        nothing = np.empty((0, 3))
+        return Frame(
+            int(arrays["step"]),
+            float(arrays["time"]),
+            arrays["positions"],
+            arrays["velocities"],
+            arrays.get("plane_points", nothing),
+            forces,
+            None if forces is None else arrays.get("plane_forces", nothing),
+        )
 
     def frames(self) -> Iterator[Frame]:
         """Every frame in order, read one by one."""

@@ -15,6 +15,7 @@ import numpy as np
 import yaml
 
 from qlb import _native
+from qlb.contact import ContactReport
 from qlb.errors import InputError
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
@@ -71,6 +72,7 @@ class RunWriter:
         self._first_step = simulation.steps_done
         self._counts: list[StepCount] = []
         self._now = Checkpoint.of(simulation)
+        self._contact: ContactReport | None = None
         self._kept = -1
         self._finished = False
         layout.claim(self.directory, overwrite=overwrite)
@@ -91,7 +93,7 @@ class RunWriter:
             )
         with self._writing():
             self._add_rows(result)
-            self._now = Checkpoint.of(self._simulation)
+            self._now, self._contact = Checkpoint.of(self._simulation), result.contact
             if (result.step - self._first_step) % self._stride == 0:
                 self._keep()
 
@@ -151,6 +153,9 @@ class RunWriter:
         frame = {"positions": state.positions, "velocities": state.velocities}
         if planes := self._simulation.assembly.planes:
             frame["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
+        if self._contact is not None:
+            frame["contact_forces"] = self._contact.forces
+            frame |= {"plane_forces": self._contact.plane_forces} if planes else {}
         write_arrays(
             layout.frame_path(self.directory, step), {"step": np.int64(step), "time": np.float64(state.time), **frame}
         )
@@ -178,6 +183,7 @@ class RunWriter:
 
 def _facts(simulation: Simulation) -> dict[str, Any]:
     """What is known of a run before its first step."""
+    contact = simulation.system.contact
     return {
         "solver": simulation.solver.name,
         "integrator": simulation.integrator.name,
@@ -186,6 +192,7 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
         "tets": len(simulation.mesh.tets),
         "threads": simulation.threads,
         "tolerance": simulation.tolerance.model_dump(mode="json"),
+        "contact": None if contact is None else contact.resolved(),
         "versions": {
             "qlb": version("qlb"),
             "python": platform.python_version(),

@@ -22,6 +22,8 @@ PARTS = {
     "hessian": "#0072B2",
     "factor": "#E69F00",
     "solve": "#009E73",
+    "contact": "#CC79A7",
+    "candidates": "#F0E442",
     "other": "#B8BEC6",
 }
 """Colour of each part of a step."""

@@ -1,0 +1,73 @@
+"""What scenes with contact have in common: a character, the ground, and settings of contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from qlb.bodies import Body, Placement, Plane
+from qlb.contact import Contact
+from qlb.integrators import INTEGRATORS
+from qlb.materials import AnyMaterial, StableNeoHookean
+from qlb.mesh import TetMesh
+from qlb.scenes.loads import Vector
+from qlb.scenes.scene import Scene
+from qlb.settings import Settings, choice, quantity
+from qlb.simulation import Simulation
+
+
+class CharacterMesh(Settings):
+    """A character of `qlb.shapes`, or a mesh file, y up."""
+
+    path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the shape, y up")
+    tets: int = quantity(5000, "About how many tetrahedra the shape is to have; a file has its own", ge=100)
+    height: float = quantity(0.3, "Height along y before it is turned; a file is scaled to it", unit="m", gt=0)
+
+    def make(self, shape: Callable[..., TetMesh]) -> TetMesh:
+        """The mesh. Raises `InputError` where the file is wrong, or the shape cannot be made with so few tets."""
+        if self.path is None:
+            return shape(tets=self.tets, height=self.height)
+        mesh = TetMesh.read(self.path)
+        return Placement(scale=self.height / float(np.ptp(mesh.positions[:, 1]))).of(mesh)
+
+
+class ContactScene(Scene):
+    """Settings of scenes in which bodies fall on the ground, the plane y = 0."""
+
+    material: AnyMaterial = Field(StableNeoHookean(young=5e4, poisson=0.45), description="What the bodies are made of")
+    contact: Contact = Contact(friction=0.3)
+    integrator: str = choice("SDIRK2", "Time integrator", INTEGRATORS)
+    steps: int = quantity(200, "Number of time steps", ge=1)
+
+    def simulate(self, bodies: Sequence[Body]) -> Simulation:
+        """The bodies over the ground, with the loads. Raises `InputError` where settings are wrong."""
+        simulation = Simulation(
+            bodies, obstacles=[Plane((0, 0, 0), (0, 1, 0), name="ground")], **self.simulation_arguments()
+        )
+        self.loads.add_to(simulation)
+        return simulation
+
+    def body(self, mesh: TetMesh, name: str) -> Body:
+        """A body of the scene's material, where `mesh` lies."""
+        return Body(mesh, self.material, fibres=() if self.fibres is None else (self.fibres,), name=name)
+
+    def simulation_arguments(self) -> dict[str, Any]:
+        """Without what each body has its own."""
+        arguments = super().simulation_arguments()
+        return {k: v for k, v in arguments.items() if k not in ("material", "fibres")} | {"contact": self.contact}
+
+
+def lifted(mesh: TetMesh, rotation: Vector, lowest: float, x: float = 0.0, z: float = 0.0) -> TetMesh:
+    """`mesh` turned about its centre of volume (a rotation vector [rad]), lowest at y = `lowest`, and centred at x, z.
+
+    Raises:
+        InputError: a number that is not finite.
+    """
+    turned = Placement(rotation=rotation).of(mesh).positions
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    shift = (x - 0.5 * (low[0] + high[0]), lowest - low[1], z - 0.5 * (low[2] + high[2]))
+    return Placement(rotation=rotation, translation=shift).of(mesh)
