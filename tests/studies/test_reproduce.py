@@ -49,17 +49,18 @@ def done(tmp_path_factory, few_solvers) -> Reproduction:
 
 
 def test_the_figures_are_the_supplements():
-    assert list(FIGURES) == [1, 2, 3, 4, 5]
-    assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3]
+    assert list(FIGURES) == [1, 2, 3, 4, 5, 9, 10]
+    assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3, 1, 1]
     scene = load_scene("bar")
     assert (scene.steps, scene.tolerance.relative, scene.tolerance.absolute) == (120, 1e-6, 0)
 
 
 def test_a_case_of_several_figures_runs_once(tmp_path):
-    planned = plan(tmp_path, *FIGURES)
-    by_figure = [{case.name for case in planned.cases_of(figure)} for figure in FIGURES.values()]
+    figures = [figure for figure in FIGURES.values() if figure.scene == "bar"]
+    planned = plan(tmp_path, *(figure.number for figure in figures))
+    by_figure = [{case.name for case in planned.cases_of(figure)} for figure in figures]
     assert set.intersection(*by_figure) == {"bar-default-ND", "bar-default-QLB"}
-    assert len(planned.panels) == 2 * sum(len(figure.rows) for figure in FIGURES.values())
+    assert len(planned.panels) == 2 * sum(len(figure.rows) for figure in figures)
     assert len(planned.cases) == len(set.union(*by_figure)) == 2 * (1 + 3 + 1 + 1 + 1 + 2)
     assert len({case.directory for case in planned.cases}) == len(planned.cases)
 
@@ -132,7 +133,7 @@ def test_stopping_keeps_what_is_done_and_the_same_call_goes_on(tmp_path):
     ("figure", "text"), [("7", "cannot be redrawn yet"), ("11", "not known"), ("one", "not known"), ("-1", "not known")]
 )
 def test_unknown_figures_are_refused_with_those_there_are(figure, text):
-    with pytest.raises(qlb.InputError, match=rf"figure.*{text}.*there are 1, 2, 3, 4, 5"):
+    with pytest.raises(qlb.InputError, match=rf"figure.*{text}.*there are 1, 2, 3, 4, 5, 9, 10"):
         chosen_figures([figure])
 
 

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from qlb.bodies import Body, Placement, Plane
 from qlb.contact import Contact
+from qlb.energies import Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, StableNeoHookean
 from qlb.mesh import TetMesh
@@ -38,7 +39,8 @@ class CharacterMesh(Settings):
 class ContactScene(Scene):
     """Settings of scenes in which bodies fall on the ground, the plane y = 0."""
 
-    material: AnyMaterial = Field(StableNeoHookean(young=5e4, poisson=0.45), description="What the bodies are made of")
+    material: AnyMaterial = Field(StableNeoHookean(young=2e4, poisson=0.45), description="What the bodies are made of")
+    damping: Damping = Damping(viscosity=20)
     contact: Contact = Contact(friction=0.3)
     integrator: str = choice("SDIRK2", "Time integrator", INTEGRATORS)
     steps: int = quantity(200, "Number of time steps", ge=1)

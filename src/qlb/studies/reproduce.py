@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,15 +81,23 @@ def plan_figures(figures: Sequence[SupplementFigure], overrides: Sequence[str], 
         key = override.partition("=")[0].strip()
         if key in _OURS:
             raise InputError(f"--set {override!r}: {key} is set by the figures; leave it out")
-    common = [*_FIXED, *overrides]
-    bases = {figure.scene: load_scene(figure.scene, common).model_dump(mode="json") for figure in figures}
+    common = {figure.number: [*_FIXED, *figure.settings, *overrides] for figure in figures}
+    bases = {figure.scene: _base(figure, common[figure.number]) for figure in figures}
     panels = {
-        (figure.number, row.label, solver): _case(figure, row, solver, common, directory)
+        (figure.number, row.label, solver): _case(figure, row, solver, common[figure.number], directory)
         for figure in figures
         for row in figure.rows
         for solver in COLUMNS
     }
     return Plan(directory, figures, bases, overrides, panels)
+
+
+def _base(figure: SupplementFigure, overrides: Sequence[str]) -> dict[str, Any]:
+    """The settings of a figure's scene. Raises `InputError` for an override that it refuses, with the scene named."""
+    try:
+        return load_scene(figure.scene, overrides).model_dump(mode="json")
+    except InputError as error:
+        raise InputError(f"figure {figure.number}, scene {figure.scene}: {error}") from None
 
 
 def _case(figure: SupplementFigure, row: Row, solver: str, common: Sequence[str], directory: Path) -> Case:
@@ -169,11 +178,15 @@ def _grids(plan: Plan) -> Iterator[FigureGrid]:
 
 
 def _with_others(plan: Plan) -> Plan:
-    """The plan for all figures, under the same settings."""
-    others = [figure for figure in FIGURES.values() if figure not in plan.figures]
-    more = plan_figures(others, plan.overrides, plan.directory)
-    figures = sorted([*plan.figures, *others], key=lambda figure: figure.number)
-    return Plan(plan.directory, figures, plan.bases, plan.overrides, more.panels | plan.panels)
+    """The plan for all figures whose scenes take the same settings."""
+    figures, panels = list(plan.figures), dict(plan.panels)
+    for figure in FIGURES.values():
+        if figure not in plan.figures:
+            with suppress(InputError):
+                panels |= plan_figures([figure], plan.overrides, plan.directory).panels
+                figures.append(figure)
+    figures.sort(key=lambda figure: figure.number)
+    return Plan(plan.directory, figures, plan.bases, plan.overrides, panels)
 
 
 def _grid(figure: SupplementFigure, plan: Plan, runs: dict[str, Run | None]) -> FigureGrid:
