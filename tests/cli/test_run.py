@@ -225,3 +225,28 @@ def test_interrupt_keeps_what_is_done(tmp_path, name):
     assert "kept" in err
     assert summary["status"] == "interrupted"
     assert 4 <= summary["steps"] == len(list(Path(frames).glob("*.npz"))) - 1
+
+
+def test_a_run_with_contact_shows_it(qlb, tmp_path):
+    small = ["--set", "mesh.tets=500", "--set", "drop.height=0.01", "--set", "contact.friction=0.5"]
+    status, out, _ = qlb("run", "bunny", *small, "--steps", "8", "--threads", "1", "--solver", "ND", "--out", "out")
+    assert status == 0
+    assert "contact.png" in out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert 0 < summary["minimum_distance"] < summary["contact"]["dhat"]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Contacts and the smallest distance" in page
+    assert f"{summary['minimum_distance']:.4g} m" in page
+    status, out, _ = qlb("run", "bar", *SMALL, "--out", "bar", "--no-picture")
+    assert "contact.png" not in out
+    assert "dhat" not in (tmp_path / "bar" / "report.html").read_text()
+
+
+def test_a_check_that_finds_an_intersection_ends_the_run_with_status_1(qlb, tmp_path):
+    keys = ("contact.mode=penalty", "contact.stiffness=10", "contact.check=true", "drop.height=0.01")
+    weak = [word for key in keys for word in ("--set", key)]
+    arguments = [*weak, "--set", "mesh.tets=500", "--steps", "20", "--threads", "1", "--solver", "ND", "--no-picture"]
+    status, out, err = qlb("run", "bunny", *arguments, "--out", "out")
+    assert status == 1
+    assert "behind ground" in out + err
+    assert len(list((tmp_path / "out" / "frames").iterdir())) > 1

@@ -26,13 +26,11 @@ class CharacterMesh(Settings):
 
     path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the shape, y up")
     tets: int = quantity(5000, "About how many tetrahedra the shape is to have; a file has its own", ge=100)
-    height: float = quantity(0.3, "Height along y before it is turned; a file is scaled to it", unit="m", gt=0)
+    height: float = quantity(0.3, "Height along y before it is turned, to which the mesh is scaled", unit="m", gt=0)
 
     def make(self, shape: Callable[..., TetMesh]) -> TetMesh:
         """The mesh. Raises `InputError` where the file is wrong, or the shape cannot be made with so few tets."""
-        if self.path is None:
-            return shape(tets=self.tets, height=self.height)
-        mesh = TetMesh.read(self.path)
+        mesh = shape(tets=self.tets) if self.path is None else TetMesh.read(self.path)
         return Placement(scale=self.height / float(np.ptp(mesh.positions[:, 1]))).of(mesh)
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from qlb.energies import Acceleration, Damping
 from qlb.integrators import INTEGRATORS
@@ -43,6 +44,22 @@ class Scene(Settings):
     )
     threads: int | None = quantity(None, "Threads for kernels and BLAS; all that the process may use by default", ge=1)
     output: OutputSettings = OutputSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keep_own_defaults(cls, data: Any) -> Any:
+        """Where part of a group is given, such as contact.dhat, the rest is as the scene has it by default."""
+        if not isinstance(data, Mapping):
+            return data
+        given = dict(data)
+        for name, field in cls.model_fields.items():
+            default, group = field.default, given.get(name)
+            if not (isinstance(default, Settings) and isinstance(group, Mapping)):
+                continue
+            own = {key: getattr(default, key) for key in default.model_fields_set}
+            if group.get("model", getattr(default, "model", None)) == getattr(default, "model", None):
+                given[name] = own | dict(group)
+        return given
 
     @abstractmethod
     def build(self) -> Simulation:

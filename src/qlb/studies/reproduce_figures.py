@@ -153,7 +153,7 @@ _BUNNY = SupplementFigure(
     " more than a few iterations. When it lands, the barrier adds forces that no factor from before the contact knows"
     " of: QLF runs into the limit of 500 iterations and does not converge, step after step; plain QLB has trouble where"
     " contacts appear within a step; ND stays in the tens, each with a factor of its own.",
-    ("mesh.tets=1500", "drop.height=0.1", "steps=60"),
+    ("mesh.tets=2500", "drop.height=0.1", "steps=80"),
 )
 _DUCKS = SupplementFigure(
     10,
@@ -163,7 +163,7 @@ _DUCKS = SupplementFigure(
     (Row("ducks", "ducks", ()),),
     "As figure 9, with contacts between bodies that come and go all the time, so that most steps are hard. The second"
     " stage (red) takes over the contacts of the first.",
-    ("mesh.tets=400", "count=5", "stack.height=0.02", "stack.spacing=0.01", "steps=40"),
+    ("mesh.tets=700", "stack.height=0.02", "stack.spacing=0.01", "steps=60"),
 )
 
 _ALL = (_STIFFNESS, _INCOMPRESSIBILITY, _HETEROGENEITY, _ANISOTROPY, _INTEGRATORS, _BUNNY, _DUCKS)
