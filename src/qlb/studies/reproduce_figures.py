@@ -161,8 +161,8 @@ _DUCKS = SupplementFigure(
     "several bodies on each other and the ground",
     "ducks",
     (Row("ducks", "ducks", ()),),
-    "As figure 9, with contacts between bodies that come and go all the time, so that most steps are hard: QLF and plain"
-    " QLB need hundreds of iterations, and do not always get there.",
+    "As figure 9, with contacts between bodies that come and go all the time, so that most steps are hard: QLF and"
+    " plain QLB need hundreds of iterations, and do not always get there.",
     ("mesh.tets=700", "stack.height=0.02", "stack.spacing=0.01", "steps=60"),
 )
 
