@@ -29,6 +29,10 @@ class QLA(FactoredLbfgs):
     through since then. R keeps shear and inertia as they are; A takes what keeps volumes to what keeps volumes, since
     d det F = cof F : dF, and the closer to incompressible a material is, the more that matters.
 
+    With contact the factor holds inertia and elasticity alone, in double precision: next to stiff contacts single is
+    too little. All contacts enter by Woodbury's formula, with half-solves for their nodes that last as long as the
+    factor, and pairs hold the change of the gradient without contact, whose Hessian of the moment is known.
+
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
     cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
     counted in iterations, from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
@@ -44,6 +48,8 @@ class QLA(FactoredLbfgs):
     }
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
+        if system.contact is not None and settings.precision in (None, "auto"):
+            settings = settings.model_copy(update={"precision": "float64"})
         super().__init__(system, settings, tolerance)
         self.system = system
         kept = (self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
@@ -150,9 +156,9 @@ class QLA(FactoredLbfgs):
             then = StageProblem(self.system, stage, State(0.0, self._reference, stage.v_b), Timer())
             values = then.hessian(self._reference, project=bool(projected)).values
         self.factor.restore(values, projected=bool(projected), raised=bool(raised))
-        self._carried.reset()
         if self._low_rank is not None:
             self._low_rank.forget()
+        self._carried.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
         self._reference = None  # until the new factor stands
@@ -160,9 +166,9 @@ class QLA(FactoredLbfgs):
             projection = "always"
         self.factor.update(problem, point.x, projection)
         self._indefinite = self.factor.projected
-        self._carried.reset()
         if self._low_rank is not None:
             self._low_rank.forget()
+        self._carried.reset()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)
         self._solves = self._spent = 0
