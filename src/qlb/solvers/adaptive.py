@@ -20,6 +20,7 @@ from qlb.timing import Timer
 
 MAX_RESCUES = 3
 PATIENCE = 5
+DAMPING = 0.2
 
 
 class QLA(FactoredLbfgs):
@@ -98,21 +99,41 @@ class QLA(FactoredLbfgs):
         with problem.timer.section("contact"):
             terms, rest, forces = _split(problem, point, point.contact)
             self._low_rank.set_terms(terms)
+            self._terms = terms
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
             slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces)
+            self._p = p
             return p, slope
 
-    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+    def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
 
         Where contact limits a step it is still being found, which a new factor does not shorten: contraction counts
         from the last such step.
         """
-        self.history.push(old.x, new.x, old.smooth, new.smooth)
+        smooth = new.smooth if old.contact is None else self._damped(problem, old, new)
+        self.history.push(old.x, new.x, old.smooth, smooth)
         self._iterations += 1
         if limited:
             self._mark(new)
+
+    def _damped(self, problem: StageProblem, old: Point, new: Point) -> FloatArray:
+        """The new gradient without contact, changed where its change would soften the model too much at once.
+
+        Powell 1978: y is mixed with B s until s.y >= 0.2 s.B s, B being the model without contact: B s follows from
+        (B + C K C^T) p = -g.
+        """
+        s = new.x - old.x
+        t = problem.system.norm(s) / problem.system.norm(self._p)
+        Bs = -t * old.gradient
+        self._terms.add_product(s, Bs, -1.0)
+        problem.system.clear_held(Bs)
+        sBs, sy = problem.system.dot(s, Bs), problem.system.dot(s, new.smooth - old.smooth)
+        if sy >= DAMPING * sBs:
+            return new.smooth
+        share = (1 - DAMPING) * sBs / (sBs - sy)
+        return old.smooth + share * (new.smooth - old.smooth) + (1 - share) * Bs
 
     def end_solve(self) -> None:
         """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
