@@ -146,9 +146,12 @@ class StageContact:
         """
         if not self.model.is_barrier:
             return 1.0
-        self.cover(x, p)
         with self._timer.section("candidates"):
-            return min(self._plane_bound(x, p, moving_planes), self.model.candidates.step_bound(x, p))
+            to_planes = self._plane_bound(x, p, moving_planes)
+        way = p if to_planes == 1 else to_planes * p
+        self.cover(x, way)
+        with self._timer.section("candidates"):
+            return to_planes * self.model.candidates.step_bound(x, way)
 
     def _plane_bound(self, x: FloatArray, p: FloatArray, moving_planes: bool) -> float:
         model = self.model

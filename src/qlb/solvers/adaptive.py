@@ -20,6 +20,7 @@ from qlb.timing import Timer
 
 MAX_RESCUES = 3
 PATIENCE = 5
+DAMPING = 0.2
 
 
 class QLA(FactoredLbfgs):
@@ -28,6 +29,10 @@ class QLA(FactoredLbfgs):
     T is block-diagonal, for each node between the rotation R and the affine map A that the material around it has been
     through since then. R keeps shear and inertia as they are; A takes what keeps volumes to what keeps volumes, since
     d det F = cof F : dF, and the closer to incompressible a material is, the more that matters.
+
+    With contact the factor holds inertia and elasticity alone, in double precision: next to stiff contacts single is
+    too little. All contacts enter by Woodbury's formula, with half-solves for their nodes that last as long as the
+    factor, and pairs hold the change of the gradient without contact, whose Hessian of the moment is known.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
     cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
@@ -44,6 +49,8 @@ class QLA(FactoredLbfgs):
     }
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
+        if system.contact is not None and settings.precision in (None, "auto"):
+            settings = settings.model_copy(update={"precision": "float64"})
         super().__init__(system, settings, tolerance)
         self.system = system
         kept = (self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
@@ -92,21 +99,41 @@ class QLA(FactoredLbfgs):
         with problem.timer.section("contact"):
             terms, rest, forces = _split(problem, point, point.contact)
             self._low_rank.set_terms(terms)
+            self._terms = terms
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
             slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces)
+            self._p = p
             return p, slope
 
-    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+    def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
 
         Where contact limits a step it is still being found, which a new factor does not shorten: contraction counts
         from the last such step.
         """
-        self.history.push(old.x, new.x, old.smooth, new.smooth)
+        smooth = new.smooth if old.contact is None else self._damped(problem, old, new)
+        self.history.push(old.x, new.x, old.smooth, smooth)
         self._iterations += 1
         if limited:
             self._mark(new)
+
+    def _damped(self, problem: StageProblem, old: Point, new: Point) -> FloatArray:
+        """The new gradient without contact, changed where its change would soften the model too much at once.
+
+        Powell 1978: y is mixed with B s until s.y >= 0.2 s.B s, B being the model without contact: B s follows from
+        (B + C K C^T) p = -g.
+        """
+        s = new.x - old.x
+        t = problem.system.norm(s) / problem.system.norm(self._p)
+        Bs = -t * old.gradient
+        self._terms.add_product(s, Bs, -1.0)
+        problem.system.clear_held(Bs)
+        sBs, sy = problem.system.dot(s, Bs), problem.system.dot(s, new.smooth - old.smooth)
+        if sy >= DAMPING * sBs:
+            return new.smooth
+        share = (1 - DAMPING) * sBs / (sBs - sy)
+        return old.smooth + share * (new.smooth - old.smooth) + (1 - share) * Bs
 
     def end_solve(self) -> None:
         """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
@@ -150,9 +177,9 @@ class QLA(FactoredLbfgs):
             then = StageProblem(self.system, stage, State(0.0, self._reference, stage.v_b), Timer())
             values = then.hessian(self._reference, project=bool(projected)).values
         self.factor.restore(values, projected=bool(projected), raised=bool(raised))
-        self._carried.reset()
         if self._low_rank is not None:
             self._low_rank.forget()
+        self._carried.reset()
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
         self._reference = None  # until the new factor stands
@@ -160,9 +187,9 @@ class QLA(FactoredLbfgs):
             projection = "always"
         self.factor.update(problem, point.x, projection)
         self._indefinite = self.factor.projected
-        self._carried.reset()
         if self._low_rank is not None:
             self._low_rank.forget()
+        self._carried.reset()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)
         self._solves = self._spent = 0

@@ -48,7 +48,7 @@ class Descent(ABC):
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """The search direction p at a point, shape (n, 3), and the slope g.p along it."""
 
-    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+    def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Learn from an accepted step, which contact may have `limited`."""
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
@@ -138,7 +138,7 @@ class Descent(ABC):
                 log.add(old, 0.0)
                 return found
             step_length, new, longest = found
-            self.accept(old, new, limited=longest < 1)
+            self.accept(problem, old, new, limited=longest < 1)
             log.add(new, step_length, longest)
             reason = _converged(new, *goals)
         return reason
@@ -189,10 +189,10 @@ def _reach(p: FloatArray) -> float:
 
 
 def _longest_step(problem: StageProblem, x: FloatArray, p: FloatArray) -> float:
-    """The part of p (n, 3) [m] that contact allows, which is no longer than the bodies are large; 1 without contact."""
+    """The part of p (n, 3) [m] that contact allows and that is no longer than anything may move; 1 without contact."""
     if problem.contact is None:
         return 1.0
-    clamp = min(1.0, problem.contact.model.extent / _reach(p))
+    clamp = min(1.0, problem.plausible_move / _reach(p))
     return clamp * problem.contact.bound(x, p if clamp == 1 else clamp * p)
 
 

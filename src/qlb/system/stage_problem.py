@@ -14,6 +14,7 @@ from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
 
+MOVE = 1.5  # times the way that inertia would take: as far as one iteration goes with contact
 BENDING = 0.1  # of the stiffness of the bodies, from which on the turning of normals is taken into account
 
 
@@ -180,6 +181,26 @@ class StageProblem:
         """About the mean diagonal entry of the Hessian without contact."""
         system = self.system
         return float(np.mean(self._mass_scale * system.mass + 10 * self.force_scale * system.spring))
+
+    @cached_property
+    def plausible_move(self) -> float:
+        """How far one iteration may move a node where there is contact [m].
+
+        Some times the way that inertia alone would take from where the solve comes from; without inertia, the extent
+        of the bodies. Longer search directions come from an ill-conditioned model, and searching the way for what they
+        meet is dear.
+        """
+        assert self.system.contact is not None
+        model = self.system.contact
+        if not self.stage.inertial:
+            return model.extent
+        way = max(float(np.abs(x - self.origin.positions).max()) for x in (self.start, self.predictor, self._inertial))
+        return min(model.extent, MOVE * way + 5 * model.dhat)
+
+    @property
+    def _inertial(self) -> FloatArray:
+        """Where inertia alone leads [m], held nodes exact."""
+        return self.system.held.place(self._target, self.stage.time)
 
     @cached_property
     def predictor(self) -> FloatArray:
