@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +15,10 @@ from qlb.solvers.line_search import Point, backtrack
 from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
 from qlb.system import StageProblem, System
+
+
+SETTLED = 0.5
+"""Part of |g| that a small step may leave. Where it leaves more, the way to the solution is longer than the step."""
 
 
 class Descent(ABC):
@@ -135,10 +139,11 @@ class Descent(ABC):
             if isinstance(found, Reason):
                 log.add(old, 0.0)
                 return found
-            step_length, new, longest = found
-            self.accept(old, new)
-            log.add(new, step_length, longest)
-            reason = _converged(new, *goals)
+            self.accept(old, found.point)
+            log.add(found.point, found.step_length, found.longest)
+            reason = _converged(found.point, *goals)
+            if reason is None and found.small and found.point.residual <= SETTLED * old.residual:
+                reason = Reason.CONVERGED_STEP
         return reason
 
     def _initial_point(self, problem: StageProblem) -> Point:
@@ -149,17 +154,23 @@ class Descent(ABC):
                 return guess
         return Point.at(problem, problem.start)
 
-    def _search(self, problem: StageProblem, point: Point) -> tuple[float, Point, float] | Reason:
-        """The accepted step length, the point there, and the longest step that was allowed; or why there is none."""
+    def _search(self, problem: StageProblem, point: Point) -> _Found | Reason:
+        """The next point, or why there is none.
+
+        A direction short enough to end the solve is followed, too: as it is there already, it costs little, and forces
+        of contact need places far more exact than dhat where they act near the end of its reach.
+        """
         while True:
             p, slope = self.direction(problem, point)
             if np.isfinite(slope) and slope < 0:
-                if problem.contact is not None and _reach(p) <= self.tolerance.step * problem.contact.model.dhat:
-                    return Reason.CONVERGED_STEP
+                contact = problem.contact
+                small = contact is not None and _reach(p) <= self.tolerance.step * contact.model.dhat
                 longest = _longest_step(problem, point.x, p)
                 found = backtrack(problem, point, p, slope, longest)
                 if found is not None:
-                    return *found, longest
+                    return _Found(*found, longest, small)
+                if small:
+                    return Reason.CONVERGED_STEP
             if not self.recover(problem, point):
                 return Reason.LINE_SEARCH_FAILED
 
@@ -173,6 +184,18 @@ class Descent(ABC):
         tolerance = self.tolerance
         scaled = tolerance.scaled * problem.residual_scale
         return tolerance.relative * reference, max(tolerance.absolute, scaled, problem.residual_rounding)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a search led to."""
+
+    step_length: float
+    point: Point
+    longest: float
+    """the longest step that was allowed"""
+    small: bool
+    """whether the direction was too short to go on"""
 
 
 def _converged(point: Point, relative: float, absolute: float) -> Reason | None:
