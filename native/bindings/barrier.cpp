@@ -64,6 +64,11 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 12, 12>> hessian_blocks(const Barri
 }
 
 void bind_potential(nb::module_& m) {
+  nb::class_<Barrier::Bending> bending(m, "Bending",
+                                       "Terms k a a^T of the Hessian of contacts, besides the normal ones.");
+  property(bending, "nodes", &Barrier::Bending::nodes);
+  property(bending, "vectors", &Barrier::Bending::vectors);
+  property(bending, "stiffness", &Barrier::Bending::stiffness);
   nb::class_<Barrier>(m, "Barrier", "The potential of contact: a barrier, or a penalty where states may intersect.")
       .def(
           "__init__",
@@ -83,6 +88,12 @@ void bind_potential(nb::module_& m) {
            "between all vertices and the planes (q, 4) [unit normal, offset] that hold out their groups "
            "(plane_allowed (q, groups)). Adds scale times the gradient of the energy to gradient (n, 3). "
            "edge_sign (l) int8, for a penalty: -1 where two edges have passed through each other.")
+      .def(
+          "bending",
+          [](const Barrier& b, const Array<const double>& x, const ContactSet& contacts, double threshold) {
+            return b.bending(sized(x, 3 * b.surface().nodes(), "x"), contacts, threshold);
+          },
+          nb::arg("x"), nb::arg("contacts"), nb::arg("threshold"), ReleaseGil())
       .def("hessian_blocks", &hessian_blocks, nb::arg("x"), nb::arg("contacts"), nb::arg("project"),
            "The Hessian of each contact (size, 12, 12) at the x where `contacts` were found, scaled as they are. "
            "project: to the nearest positive semidefinite matrices.");

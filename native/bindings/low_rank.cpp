@@ -15,7 +15,7 @@ auto rows(const std::vector<std::array<T, width>>& values) {
 void bind_terms(nb::module_& m) {
   constexpr auto inside = nb::rv_policy::reference_internal;
   nb::class_<RankOneTerms>(m, "RankOneTerms",
-                           "A sum of matrices stiffness a a^T, a = gamma (x) axis at the nodes of each term.")
+                           "A sum of matrices stiffness a a^T, a with a vector at each node of a term.")
       .def(
           "__init__",
           [](RankOneTerms* self, const Array<const std::int32_t>& nodes, const Array<const double>& gamma,
@@ -23,14 +23,25 @@ void bind_terms(nb::module_& m) {
             new (self) RankOneTerms(view(nodes), view(gamma), view(axis), view(stiffness));
           },
           nb::arg("nodes"), nb::arg("gamma"), nb::arg("axis"), nb::arg("stiffness"),
-          "Shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.")
+          "a = gamma (x) axis: shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.")
+      .def(
+          "__init__",
+          [](RankOneTerms* self, const Array<const std::int32_t>& nodes, const Array<const double>& vectors,
+             const Array<const double>& stiffness) {
+            new (self) RankOneTerms(view(nodes), view(vectors), view(stiffness));
+          },
+          nb::arg("nodes"), nb::arg("vectors"), nb::arg("stiffness"), "Shapes (k, 4), (k, 4, 3), (k,).")
       .def_prop_ro("size", &RankOneTerms::size)
       .def_prop_ro(
           "nodes", [](const RankOneTerms& terms) { return rows(terms.all_nodes()); }, inside)
       .def_prop_ro(
-          "gamma", [](const RankOneTerms& terms) { return rows(terms.all_gamma()); }, inside)
-      .def_prop_ro(
-          "axis", [](const RankOneTerms& terms) { return rows(terms.all_axes()); }, inside)
+          "vectors",
+          [](const RankOneTerms& terms) {
+            const auto& v = terms.all_vectors();
+            return nb::ndarray<nb::numpy, const double, nb::shape<-1, 4, 3>>(v.empty() ? nullptr : v[0].data(),
+                                                                             {v.size(), 4, 3});
+          },
+          inside)
       .def_prop_ro(
           "stiffness",
           [](const RankOneTerms& terms) {

@@ -271,4 +271,21 @@ void Barrier::hessian_blocks(const double* x, const ContactSet& contacts, bool p
   }
 }
 
+Barrier::Bending Barrier::bending(const double* x, const ContactSet& contacts, double threshold) const {
+  Bending found;
+  for (std::int64_t k = 0; k < contacts.size(); ++k) {
+    const ContactKind kind = contacts.kind(k);
+    if (kind == ContactKind::plane) continue;
+    const std::array<Vec3, 4> at = positions(x, contacts.nodes[k]);
+    const Separation s = separation(kind, at, contacts.sign[k]);
+    if (!in_reach(s.distance, contacts.dhat[k])) continue;
+    const Mollifier mollifier =
+        kind == ContactKind::edge_edge ? edge_mollifier(at, contacts.mollifier_threshold[k]) : Mollifier{};
+    const Derivatives f = potential(s.distance, contacts.weight[k], contacts.dhat[k]);
+    const int count = pair_bending(at, s, f, mollifier, threshold, found.vectors, found.stiffness);
+    found.nodes.insert(found.nodes.end(), count, contacts.nodes[k]);
+  }
+  return found;
+}
+
 }  // namespace qlb

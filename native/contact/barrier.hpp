@@ -49,6 +49,15 @@ class Barrier {
   // node i. project: to the nearest positive semidefinite matrix.
   void hessian_blocks(const double* x, const ContactSet& contacts, bool project, double* blocks) const;
 
+  // What the Hessian of contacts has besides stiffness n n^T, as far as it stiffens by more than `threshold`: the sum
+  // of k a a^T over terms.
+  struct Bending {
+    std::vector<std::array<std::int32_t, 4>> nodes;
+    std::vector<std::array<double, 12>> vectors;
+    std::vector<double> stiffness;
+  };
+  Bending bending(const double* x, const ContactSet& contacts, double threshold) const;
+
   const ContactSurface& surface() const { return *surface_; }
 
  private:

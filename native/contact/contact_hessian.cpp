@@ -100,9 +100,10 @@ void add_mollifier(const Mollifier& mollifier, Derivatives f, const Vec12& g, do
   add_cross_hessian(f.value * mollifier.m.first, mollifier, block);
 }
 
-// Takes the negative part off a matrix that vanishes across the orthonormal `basis` (rows may be zero).
-template <int n>
-void project_on(const std::array<Vec12, n>& basis, double* block) {
+// Calls f(value, vector) for each eigenpair of a matrix that vanishes across the orthonormal `basis` (rows may be
+// zero).
+template <int n, class F>
+void for_each_eigenpair(const std::array<Vec12, n>& basis, const double* block, const F& f) {
   Square<n> A, vectors;
   for (int q = 0; q < n; ++q) {
     Vec12 product{};
@@ -115,12 +116,19 @@ void project_on(const std::array<Vec12, n>& basis, double* block) {
   }
   jacobi_eigen<n>(A, vectors);
   for (int k = 0; k < n; ++k) {
-    if (!(A[k][k] < 0.0)) continue;
     Vec12 a{};
     for (int p = 0; p < n; ++p)
       for (int i = 0; i < 12; ++i) a[i] += vectors[k][p] * basis[p][i];
-    add_square(-A[k][k], a, block);
+    f(A[k][k], a);
   }
+}
+
+// Takes the negative part off.
+template <int n>
+void project_on(const std::array<Vec12, n>& basis, double* block) {
+  for_each_eigenpair<n>(basis, block, [&](double value, const Vec12& a) {
+    if (value < 0.0) add_square(-value, a, block);
+  });
 }
 
 // Without a mollifier all columns lie in {gamma, slope_b} (x) n and gamma (x) tangents: five at most.
@@ -173,6 +181,29 @@ void pair_hessian(const std::array<Vec3, 4>& x, const Separation& separation, De
     project_on<9>(relative_basis(), block);
   else
     project_on<5>(distance_basis(separation), block);
+}
+
+int pair_bending(const std::array<Vec3, 4>& x, const Separation& separation, Derivatives f, const Mollifier& mollifier,
+                 double threshold, std::vector<Vec12>& vectors, std::vector<double>& stiffness) {
+  if (!std::isfinite(f.value) || !(f.second > 0.0)) return 0;
+  const Sliding sliding(x, separation.closest);
+  const double steepest = std::max(norm(sliding.dual[0]), norm(sliding.dual[1]));
+  if (!mollifier.active() && 4.0 * std::abs(f.first) * steepest < threshold) return 0;
+  double block[144] = {};
+  add_distance_hessian(mollifier.m.value * f.first, x, separation, block);
+  if (mollifier.active()) add_mollifier(mollifier, f, outer(separation.closest.gamma, separation.normal), block);
+  int count = 0;
+  const auto keep = [&](double value, const Vec12& a) {
+    if (!(value > threshold)) return;
+    vectors.push_back(a);
+    stiffness.push_back(value);
+    ++count;
+  };
+  if (mollifier.active())
+    for_each_eigenpair<9>(relative_basis(), block, keep);
+  else
+    for_each_eigenpair<5>(distance_basis(separation), block, keep);
+  return count;
 }
 
 }  // namespace qlb

@@ -15,8 +15,8 @@ class InverseOperator {
   virtual ~InverseOperator() = default;
   virtual std::int64_t size() const = 0;
   virtual void apply(const double* b, double* x) = 0;
-  // x = B^-1 (b + C beta) and along = C^T x for the directions C of `terms`. Where they are part of B and stiff, beta is
-  // to be kept apart: its large forces would drown the rest of b.
+  // x = B^-1 (b + C beta) and along = C^T x for the directions C of `terms`. Where they are part of B and stiff, beta
+  // is to be kept apart: its large forces would drown the rest of b.
   virtual void apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x, double* along);
 };
 

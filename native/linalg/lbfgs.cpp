@@ -82,8 +82,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
     inner.apply_split(work_.data(), terms, beta_.data(), p, along_.data());
   for (int k = 0; k < count_; ++k) {
     const double *along = &along_s_[k * count], *change = &change_[k * count];
-    const double weight =
-        alpha_[k] - (dot(y(k), p, size_, threads_) + few_dot(change, along_.data())) / with_terms_[k];
+    const double weight = alpha_[k] - (dot(y(k), p, size_, threads_) + few_dot(change, along_.data())) / with_terms_[k];
     add_scaled(weight, s(k), p, size_, threads_);
     few_add(weight, along, along_);
   }

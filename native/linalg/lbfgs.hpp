@@ -21,9 +21,7 @@ class Lbfgs {
   // positive.
   bool push(const double* x_old, const double* x, const double* g_old, const double* g);
   // p = -H g, H the quasi-Newton inverse over `inner`. Returns g.p, the slope along p.
-  double direction(const double* g, InverseOperator& inner, double* p) {
-    return direction_with(g, {}, inner, {}, p);
-  }
+  double direction(const double* g, InverseOperator& inner, double* p) { return direction_with(g, {}, inner, {}, p); }
   // The same for g + C beta, with y + C K C^T s in place of each y, for terms that do not take away (structured
   // quasi-Newton: what the pairs hold is the change of the gradient without these terms, and their Hessian of the
   // moment is known). Vectors in the span of C are kept apart by their coefficients all the way: next to stiff terms
@@ -45,7 +43,7 @@ class Lbfgs {
   int first_ = 0, count_ = 0;
   Aligned<double> pairs_;  // (window + 1, 2, size)
   std::vector<double> curvature_, alpha_;
-  std::vector<double> with_terms_;    // s.y' of each pair
+  std::vector<double> with_terms_;        // s.y' of each pair
   std::vector<double> along_s_, change_;  // (pairs, terms): a_j.s, stiffness_j a_j.s
   std::vector<double> beta_, along_;      // of what is worked on: coefficients of C, and C^T p
   Aligned<double> work_;

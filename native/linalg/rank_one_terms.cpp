@@ -23,30 +23,40 @@ void check_finite(std::span<const double> values, std::size_t width, const char*
 
 }  // namespace
 
-RankOneTerms::RankOneTerms(std::span<const std::int32_t> nodes, std::span<const double> gamma,
-                           std::span<const double> axis, std::span<const double> stiffness)
-    : nodes_(stiffness.size()),
-      gamma_(stiffness.size()),
-      axis_(stiffness.size()),
-      stiffness_(stiffness.begin(), stiffness.end()) {
+void RankOneTerms::take(std::span<const std::int32_t> nodes, std::span<const double> stiffness) {
   const std::size_t count = stiffness.size();
   check_size(nodes.size(), 4 * count, "nodes");
+  check_finite(stiffness, 1, "stiffness");
+  stiffness_.assign(stiffness.begin(), stiffness.end());
+  nodes_.resize(count);
+  vector_.resize(count);
+  for (std::size_t j = 0; j < count; ++j) {
+    std::copy_n(nodes.begin() + 4 * j, 4, nodes_[j].begin());
+    for (const std::int32_t node : nodes_[j]) {
+      if (node < 0) throw std::invalid_argument("a term has node " + std::to_string(node) + ", which is negative");
+      last_node_ = std::max(last_node_, node);
+    }
+  }
+}
+
+RankOneTerms::RankOneTerms(std::span<const std::int32_t> nodes, std::span<const double> gamma,
+                           std::span<const double> axis, std::span<const double> stiffness) {
+  const std::size_t count = stiffness.size();
   check_size(gamma.size(), 4 * count, "gamma");
   check_size(axis.size(), 3 * count, "axis");
   check_finite(gamma, 4, "gamma");
   check_finite(axis, 3, "axis");
-  check_finite(stiffness, 1, "stiffness");
-  for (std::size_t j = 0; j < count; ++j) {
-    std::copy_n(nodes.begin() + 4 * j, 4, nodes_[j].begin());
-    std::copy_n(gamma.begin() + 4 * j, 4, gamma_[j].begin());
-    std::copy_n(axis.begin() + 3 * j, 3, axis_[j].begin());
-    for (const std::int32_t node : nodes_[j]) {
-      if (node < 0)
-        throw std::invalid_argument("term " + std::to_string(j) + " has node " + std::to_string(node) +
-                                    ", expected at least 0");
-      last_node_ = std::max(last_node_, node);
-    }
-  }
+  take(nodes, stiffness);
+  for (std::size_t j = 0; j < count; ++j)
+    for (int k = 0; k < 12; ++k) vector_[j][k] = gamma[4 * j + k / 3] * axis[3 * j + k % 3];
+}
+
+RankOneTerms::RankOneTerms(std::span<const std::int32_t> nodes, std::span<const double> vectors,
+                           std::span<const double> stiffness) {
+  check_size(vectors.size(), 12 * stiffness.size(), "vectors");
+  check_finite(vectors, 12, "vectors");
+  take(nodes, stiffness);
+  for (std::size_t j = 0; j < stiffness.size(); ++j) std::copy_n(vectors.begin() + 12 * j, 12, vector_[j].begin());
 }
 
 void RankOneTerms::check_nodes(std::int64_t nodes) const {
@@ -56,19 +66,17 @@ void RankOneTerms::check_nodes(std::int64_t nodes) const {
 }
 
 double RankOneTerms::dot(std::int64_t j, const double* v) const {
-  const std::array<double, 3>& n = axis_[j];
   double sum = 0.0;
   for (int i = 0; i < 4; ++i) {
     const double* at = v + 3 * static_cast<std::int64_t>(nodes_[j][i]);
-    sum += gamma_[j][i] * (n[0] * at[0] + n[1] * at[1] + n[2] * at[2]);
+    for (int c = 0; c < 3; ++c) sum += vector_[j][3 * i + c] * at[c];
   }
   return sum;
 }
 
 void RankOneTerms::add(std::int64_t j, double scale, double* out) const {
   for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 3; ++c)
-      out[3 * static_cast<std::int64_t>(nodes_[j][i]) + c] += scale * gamma_[j][i] * axis_[j][c];
+    for (int c = 0; c < 3; ++c) out[3 * static_cast<std::int64_t>(nodes_[j][i]) + c] += scale * vector_[j][3 * i + c];
 }
 
 void RankOneTerms::add_product(const double* v, double* out, double scale) const {

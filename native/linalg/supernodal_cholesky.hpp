@@ -46,8 +46,8 @@ class SupernodalCholesky : public Cholesky {
   };
   Sparse forward_sparse(std::span<const std::int64_t> dof, std::span<const double> value);
 
-  // x = P^T L^-T f(L^-1 P b), f(T* y, double scale) changing scale y in place, in elimination order and in the precision
-  // of the factor; scale is a power of two.
+  // x = P^T L^-T f(L^-1 P b), f(T* y, double scale) changing scale y in place, in elimination order and in the
+  // precision of the factor; scale is a power of two.
   template <class F>
   void solve_with(const double* b, double* x, const F& f);
 

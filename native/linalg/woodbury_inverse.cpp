@@ -5,6 +5,9 @@
 #include <stdexcept>
 
 namespace qlb {
+namespace {
+constexpr std::array<double, 3> kZero{};
+}
 
 WoodburyInverse::WoodburyInverse(std::shared_ptr<SupernodalCholesky> factor, std::shared_ptr<const TetBlocks> blocks,
                                  std::span<const std::uint8_t> fixed, int threads)
@@ -88,7 +91,7 @@ bool WoodburyInverse::express(NodeColumns<T>& columns) {
   std::vector<std::int32_t> nodes;
   for (std::int64_t j = 0; j < terms_.size(); ++j)
     for (int i = 0; i < 4; ++i)
-      if (terms_.stiffness(j) != 0.0 && terms_.gamma(j)[i] != 0.0) nodes.push_back(terms_.nodes(j)[i]);
+      if (terms_.stiffness(j) != 0.0 && terms_.vector(j, i) != kZero) nodes.push_back(terms_.nodes(j)[i]);
   columns.make(nodes);
 
   active_.clear();
@@ -126,17 +129,16 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
   if (root == 0.0) return term;
   for (int i = 0; i < 4; ++i) {
     const std::int32_t node = terms_.nodes(j)[i];
-    const double weight = root * terms_.gamma(j)[i];
-    if (weight == 0.0 || columns.held(node)) continue;
+    if (terms_.vector(j, i) == kZero || columns.held(node)) continue;
     const std::int32_t column = columns.find(node);
-    const std::array<double, 3> axis = frame_.pull_back_at(node, terms_.axis(j));
+    const std::array<double, 3> vector = frame_.pull_back_at(node, terms_.vector(j, i));
     const auto end = term.column + term.count;
     const auto at = std::find(term.column, end, column) - term.column;
     if (at == term.count) {
       term.column[term.count++] = column;
       std::fill_n(term.u[at], 3, 0.0);
     }
-    for (int c = 0; c < 3; ++c) term.u[at][c] += weight * axis[c];
+    for (int c = 0; c < 3; ++c) term.u[at][c] += root * vector[c];
   }
   return term;
 }
@@ -204,10 +206,9 @@ void WoodburyInverse::solve(const double* b, const double* beta, double* x) {
   if (active_.empty())
     factor_->apply(right_.data(), solution_.data());
   else
-    factor_->solve_with(right_.data(), solution_.data(),
-                        [&]<class T>(T* y, double scale) {
-                          correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), beta, y, scale);
-                        });
+    factor_->solve_with(right_.data(), solution_.data(), [&]<class T>(T* y, double scale) {
+      correct(*std::get<std::unique_ptr<NodeColumns<T>>>(columns_), beta, y, scale);
+    });
   frame_.push_forward(solution_.data(), x);
 }
 

@@ -48,7 +48,7 @@ class WoodburyInverse : public InverseOperator {
   std::int64_t bytes() const;    // that they and their products take
 
  private:
-  // A term in the frame of the factor: |k|^1/2 T_i^T axis gamma_i at up to four columns.
+  // A term in the frame of the factor: |k|^1/2 T_i^T a_i at up to four columns.
   struct Active {
     std::int64_t term = 0;  // its number in terms_
     double root = 0.0;      // |k|^1/2

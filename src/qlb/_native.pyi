@@ -2,7 +2,7 @@
 Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, overload
 
 import numpy
 from numpy.typing import NDArray
@@ -117,6 +117,18 @@ class ContactSet:
     @property
     def groups(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]: ...
 
+class Bending:
+    """Terms k a a^T of the Hessian of contacts, besides the normal ones."""
+
+    @property
+    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def vectors(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12), writable=False)]: ...
+
+    @property
+    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
 class Barrier:
     """
     The potential of contact: a barrier, or a penalty where states may intersect.
@@ -131,6 +143,8 @@ class Barrier:
         """
         The contacts at x (n, 3) [m] among the pairs vertex_faces (k, 2) [node, face] and edge_edges (l, 2) and between all vertices and the planes (q, 4) [unit normal, offset] that hold out their groups (plane_allowed (q, groups)). Adds scale times the gradient of the energy to gradient (n, 3). edge_sign (l) int8, for a penalty: -1 where two edges have passed through each other.
         """
+
+    def bending(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, threshold: float) -> Bending: ...
 
     def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]:
         """
@@ -382,13 +396,18 @@ def dot(a: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writa
 
 class RankOneTerms:
     """
-    A sum of matrices stiffness a a^T, a = gamma (x) axis at the nodes of each term.
+    A sum of matrices stiffness a a^T, a with a vector at each node of a term.
     """
 
+    @overload
     def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], axis: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
         """
-        Shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.
+        a = gamma (x) axis: shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.
         """
+
+    @overload
+    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], vectors: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
+        """Shapes (k, 4), (k, 4, 3), (k,)."""
 
     @property
     def size(self) -> int: ...
@@ -397,10 +416,7 @@ class RankOneTerms:
     def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
 
     @property
-    def gamma(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4), writable=False)]: ...
-
-    @property
-    def axis(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
+    def vectors(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4, 3), writable=False)]: ...
 
     @property
     def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...

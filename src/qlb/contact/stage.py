@@ -16,6 +16,16 @@ PLANE_SHARE = 0.9  # of the way to a plane that a step may go
 MARGIN = 0.25  # of dhat, by which candidates outlast the motion that they were searched for
 
 
+Terms = tuple[IntArray, FloatArray, FloatArray]
+"""A sum of k a a^T: nodes (t, 4), a at each of them (t, 4, 3), and k (t,)."""
+
+
+def joined(first: Terms, second: Terms) -> Terms:
+    """Both sums as one."""
+    nodes, vectors, stiffness = (np.concatenate(parts) for parts in zip(first, second, strict=True))
+    return nodes, vectors, stiffness
+
+
 @dataclass(frozen=True)
 class ContactPoint:
     """Contact and friction at a point, multiplied by c^2 as everything in a stage."""
@@ -26,17 +36,13 @@ class ContactPoint:
     contacts: _native.ContactSet
     friction: _native.FrictionTerms | None = None
 
-    def terms(self) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-        """The Hessian along the normals, and that of friction, as a sum of k a a^T: nodes, gamma, axes, k."""
+    def terms(self) -> Terms:
+        """The Hessian along the normals, then that of friction, as a sum of k a a^T: nodes, a, k."""
         c, f = self.contacts, self.friction
+        normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
         if f is None:
-            return c.nodes, c.gamma, c.normal, c.stiffness
-        return (
-            np.concatenate([c.nodes, f.nodes]),
-            np.concatenate([c.gamma, f.gamma]),
-            np.concatenate([c.normal, f.axis]),
-            np.concatenate([c.stiffness, f.stiffness]),
-        )
+            return normal
+        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], f.stiffness))
 
     @property
     def count(self) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
+from qlb.contact.stage import ContactPoint
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.line_search import Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
@@ -84,29 +85,28 @@ class QLA(FactoredLbfgs):
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H g, H from the pairs over the carried factor, which is made anew where contraction is too slow."""
-        touches = point.contact is not None and point.contact.count > 0  # then what is slow is contact being found
-        if self.settings.refactor_in_solve and not touches and self._needed(point) > self.kappa + PATIENCE:
+        if self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
             self._refactor(problem, point, self.settings.projection)
         if self._low_rank is None or point.contact is None:
             return super().direction(problem, point)
-        contact = point.contact
         with problem.timer.section("contact"):
-            terms = _native.RankOneTerms(*contact.terms())
+            terms, rest, forces = _split(problem, point, point.contact)
             self._low_rank.set_terms(terms)
-            forces = np.zeros(terms.size)  # of contact, which are kept apart from the rest of the gradient
-            forces[: contact.count] = contact.contacts.force
-            rest = point.gradient.copy()
-            terms.add_combination(forces, rest)
-            problem.system.clear_held(rest)
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
             slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces)
             return p, slope
 
-    def accept(self, old: Point, new: Point) -> None:
-        """Store the pair, of the gradient without contact, and count the iteration."""
+    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+        """Store the pair, of the gradient without contact, and count the iteration.
+
+        Where contact limits a step it is still being found, which a new factor does not shorten: contraction counts
+        from the last such step.
+        """
         self.history.push(old.x, new.x, old.smooth, new.smooth)
         self._iterations += 1
+        if limited:
+            self._mark(new)
 
     def end_solve(self) -> None:
         """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
@@ -180,6 +180,22 @@ class QLA(FactoredLbfgs):
             return 0.0
         rate = log(point.residual / self._marked) / done
         return log(self._goal / point.residual) / rate if rate < 0 else inf
+
+
+def _split(
+    problem: StageProblem, point: Point, contact: ContactPoint
+) -> tuple[_native.RankOneTerms, FloatArray, FloatArray]:
+    """Terms of the Hessian of contact, and the gradient as a rest (n, 3) minus forces (k,) along the terms.
+
+    Beside stiff contacts the forces are kept apart from the rest: their sum would drown it in single precision.
+    """
+    nodes, vectors, stiffness = problem.contact_terms(point.x, contact)
+    terms = _native.RankOneTerms(nodes, vectors, stiffness)
+    forces = np.zeros(terms.size)
+    forces[: contact.count] = contact.contacts.force
+    rest = point.gradient.copy()
+    terms.add_combination(forces, rest)
+    return terms, problem.system.clear_held(rest), forces
 
 
 def stretch_weight(incompressibility: float) -> float:

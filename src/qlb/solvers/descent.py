@@ -17,8 +17,12 @@ from qlb.solvers.settings import SolverSettings, Tolerance
 from qlb.system import StageProblem, System
 
 
-SETTLED = 0.5
-"""Part of |g| that a small step may leave. Where it leaves more, the way to the solution is longer than the step."""
+SETTLED = 1e-2
+"""Part of |g(x_k)| that may be left where a solve ends with a small step.
+
+A direction can be short because the solution is near, or because the factor is far too stiff, as that of QLB is where
+friction held at the beginning of a step and gives way in it.
+"""
 
 
 class Descent(ABC):
@@ -52,8 +56,8 @@ class Descent(ABC):
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """The search direction p at a point, shape (n, 3), and the slope g.p along it."""
 
-    def accept(self, old: Point, new: Point) -> None:
-        """Learn from an accepted step."""
+    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
+        """Learn from an accepted step, which contact may have `limited`."""
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
         """After a failed search: change something so that `direction` differs; False when nothing is left to try."""
@@ -126,11 +130,11 @@ class Descent(ABC):
         if reason is not None:
             return reason
         self.begin_solve(problem, log.point, max(goals))
-        reason = self._iterate(problem, log, goals)
+        reason = self._iterate(problem, log, goals, reference)
         self.end_solve()
         return reason
 
-    def _iterate(self, problem: StageProblem, log: _Log, goals: tuple[float, float]) -> Reason:
+    def _iterate(self, problem: StageProblem, log: _Log, goals: tuple[float, float], reference: float) -> Reason:
         reason = None
         while reason is None:
             if len(log.rows) > self.settings.max_iterations:
@@ -139,10 +143,10 @@ class Descent(ABC):
             if isinstance(found, Reason):
                 log.add(old, 0.0)
                 return found
-            self.accept(old, found.point)
+            self.accept(old, found.point, limited=found.longest < 1)
             log.add(found.point, found.step_length, found.longest)
             reason = _converged(found.point, *goals)
-            if reason is None and found.small and found.point.residual <= SETTLED * old.residual:
+            if reason is None and found.small and found.point.residual <= SETTLED * reference:
                 reason = Reason.CONVERGED_STEP
         return reason
 

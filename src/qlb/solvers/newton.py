@@ -27,7 +27,7 @@ class ND(Descent):
         p = -self.factor.solve(problem, point.gradient)
         return p, problem.system.dot(point.gradient, p)
 
-    def accept(self, old: Point, new: Point) -> None:
+    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
         """Go back to the projection that was asked for."""
         self._forced = None
 

@@ -46,7 +46,7 @@ class FactoredLbfgs(Descent):
             slope = self.history.direction(point.gradient, self.inverse, p)
             return p, slope
 
-    def accept(self, old: Point, new: Point) -> None:
+    def accept(self, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair (s, y) unless its curvature is not positive."""
         self.history.push(old.x, new.x, old.gradient, new.gradient)
 

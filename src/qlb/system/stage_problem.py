@@ -9,10 +9,13 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, StageContact
+from qlb.contact.stage import ContactPoint, StageContact, Terms, joined
 from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
+
+
+BENDING = 0.1  # of the stiffness of the bodies, from which on the turning of normals is taken into account
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,22 @@ class StageProblem:
             if self.stage.inertial:
                 system.inertia.add_hessian(self._mass_scale, matrix)
             return matrix
+
+    def contact_terms(self, x: FloatArray, contact: ContactPoint) -> Terms:
+        """The Hessian of `contact` at `x` (n, 3) [m] as a sum of rank-one terms, those along the normals first.
+
+        How normals turn is in it where that counts beside the stiffness of the bodies: where forces are large.
+        """
+        assert self.system.contact is not None
+        bending = self.system.contact.barrier.bending(x, contact.contacts, BENDING * self._node_stiffness)
+        vectors = bending.vectors.reshape(-1, 4, 3)
+        return joined(contact.terms(), (bending.nodes, vectors, bending.stiffness))
+
+    @cached_property
+    def _node_stiffness(self) -> float:
+        """About the mean diagonal entry of the Hessian without contact."""
+        system = self.system
+        return float(np.mean(self._mass_scale * system.mass + 10 * self.force_scale * system.spring))
 
     @cached_property
     def predictor(self) -> FloatArray:
