@@ -86,9 +86,7 @@ class ContactModel:
         """Whether anything slides with friction."""
         return bool(self.friction.any())
 
-    def evaluate(
-        self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray
-    ) -> _native.ContactSet:
+    def evaluate(self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray) -> _native.ContactSet:
         """The contacts at `x` (n, 3) [m] among the candidates; `scale` dPhi/dx is added to `gradient` (n, 3)."""
         planes = np.column_stack([self.normals, offsets])
         pairs = self.candidates.vertex_faces, self.candidates.edge_edges

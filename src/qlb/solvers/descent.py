@@ -18,7 +18,7 @@ from qlb.system import StageProblem, System
 
 
 SETTLED = 1e-2
-"""Part of |g(x_k)| that may be left where a solve ends with a small step.
+"""Part of |g(x_k)|, or of all contact forces where they are more, that may be left where a solve ends by a small step.
 
 A direction can be short because the solution is near, or because the factor is far too stiff, as that of QLB is where
 friction held at the beginning of a step and gives way in it.
@@ -146,7 +146,7 @@ class Descent(ABC):
             self.accept(old, found.point, limited=found.longest < 1)
             log.add(found.point, found.step_length, found.longest)
             reason = _converged(found.point, *goals)
-            if reason is None and found.small and found.point.residual <= SETTLED * reference:
+            if reason is None and found.small and _is_settled(problem, found.point, reference):
                 reason = Reason.CONVERGED_STEP
         return reason
 
@@ -206,6 +206,11 @@ def _converged(point: Point, relative: float, absolute: float) -> Reason | None:
     if point.residual <= relative:
         return Reason.CONVERGED_RELATIVE
     return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
+
+
+def _is_settled(problem: StageProblem, point: Point, reference: float) -> bool:
+    contact = 0.0 if point.contact is None else problem.residual(point.contact.gradient)
+    return point.residual <= SETTLED * max(reference, contact)
 
 
 def _reach(p: FloatArray) -> float:
