@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +15,14 @@ from qlb.solvers.line_search import Point, backtrack
 from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
 from qlb.system import StageProblem, System
+
+
+SETTLED = 1e-2
+"""Part of |g(x_k)|, or of all contact forces where they are more, that may be left where a solve ends by a small step.
+
+A direction can be short because the solution is near, or because the factor is far too stiff, as that of QLB is where
+friction held at the beginning of a step and gives way in it.
+"""
 
 
 class Descent(ABC):
@@ -124,11 +132,11 @@ class Descent(ABC):
         if reason is not None:
             return reason
         self.begin_solve(problem, log.point, max(goals))
-        reason = self._iterate(problem, log, goals)
+        reason = self._iterate(problem, log, goals, reference)
         self.end_solve()
         return reason
 
-    def _iterate(self, problem: StageProblem, log: _Log, goals: tuple[float, float]) -> Reason:
+    def _iterate(self, problem: StageProblem, log: _Log, goals: tuple[float, float], reference: float) -> Reason:
         reason = None
         while reason is None:
             if len(log.rows) > self.settings.max_iterations:
@@ -137,10 +145,11 @@ class Descent(ABC):
             if isinstance(found, Reason):
                 log.add(old, 0.0)
                 return found
-            step_length, new, longest = found
-            self.accept(problem, old, new, limited=longest < 1)
-            log.add(new, step_length, longest)
-            reason = _converged(new, *goals)
+            self.accept(problem, old, found.point, limited=found.longest < 1)
+            log.add(found.point, found.step_length, found.longest)
+            reason = _converged(found.point, *goals)
+            if reason is None and found.small and _is_settled(problem, found.point, reference):
+                reason = Reason.CONVERGED_STEP
         return reason
 
     def _initial_point(self, problem: StageProblem) -> Point:
@@ -151,17 +160,23 @@ class Descent(ABC):
                 return guess
         return Point.at(problem, problem.start)
 
-    def _search(self, problem: StageProblem, point: Point) -> tuple[float, Point, float] | Reason:
-        """The accepted step length, the point there, and the longest step that was allowed; or why there is none."""
+    def _search(self, problem: StageProblem, point: Point) -> _Found | Reason:
+        """The next point, or why there is none.
+
+        A direction short enough to end the solve is followed, too: as it is there already, it costs little, and forces
+        of contact need places far more exact than dhat where they act near the end of its reach.
+        """
         while True:
             p, slope = self.direction(problem, point)
             if np.isfinite(slope) and slope < 0:
-                if problem.contact is not None and _reach(p) <= self.tolerance.step * problem.contact.model.dhat:
-                    return Reason.CONVERGED_STEP
+                contact = problem.contact
+                small = contact is not None and _reach(p) <= self.tolerance.step * contact.model.dhat
                 longest = _longest_step(problem, point.x, p)
                 found = backtrack(problem, point, p, slope, longest)
                 if found is not None:
-                    return *found, longest
+                    return _Found(*found, longest, small)
+                if small:
+                    return Reason.CONVERGED_STEP
             if not self.recover(problem, point):
                 return Reason.LINE_SEARCH_FAILED
 
@@ -177,10 +192,27 @@ class Descent(ABC):
         return tolerance.relative * reference, max(tolerance.absolute, scaled, problem.residual_rounding)
 
 
+@dataclass(frozen=True)
+class _Found:
+    """What a search led to."""
+
+    step_length: float
+    point: Point
+    longest: float
+    """the longest step that was allowed"""
+    small: bool
+    """whether the direction was too short to go on"""
+
+
 def _converged(point: Point, relative: float, absolute: float) -> Reason | None:
     if point.residual <= relative:
         return Reason.CONVERGED_RELATIVE
     return Reason.CONVERGED_ABSOLUTE if point.residual <= absolute else None
+
+
+def _is_settled(problem: StageProblem, point: Point, reference: float) -> bool:
+    contact = 0.0 if point.contact is None else problem.residual(point.contact.gradient)
+    return point.residual <= SETTLED * max(reference, contact)
 
 
 def _reach(p: FloatArray) -> float:
