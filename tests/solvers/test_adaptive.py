@@ -157,7 +157,7 @@ def test_a_solve_dearer_than_the_mean_calls_for_a_new_factor() -> None:
 def test_the_iterations_to_come_are_those_of_the_mean_contraction() -> None:
     system = bar_system()
     solver = adaptive(system)
-    point = Point(np.zeros((1, 3)), 0.0, np.zeros((1, 3)), 1e-3)
+    point = Point(np.zeros((1, 3)), 0.0, np.zeros((1, 3)), 1e-3, np.zeros((1, 3)))
     solver._goal, solver._marked, solver._marked_at = 1e-6, 1.0, 2
     solver._iterations = 2 + PATIENCE - 1
     assert solver._needed(point) == 0.0

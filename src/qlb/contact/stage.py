@@ -43,12 +43,17 @@ class ContactPoint:
     friction: _native.FrictionTerms | None = None
 
     def terms(self) -> Terms:
-        """The Hessian along the normals, then that of friction, as a sum of k a a^T: nodes, a, k."""
+        """The Hessian along the normals, then that of friction, as a sum of k a a^T: nodes, a, k.
+
+        Friction has the stiffness mu lambda f1(u)/u in all directions of sliding, also along u where the Hessian has
+        less, or nothing: that quadratic lies above its potential, so that a step does not go too far.
+        """
         c, f = self.contacts, self.friction
         normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
         if f is None:
             return normal
-        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], f.stiffness))
+        across = np.repeat(f.stiffness[1::2], 2)
+        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], across))
 
     @property
     def count(self) -> int:

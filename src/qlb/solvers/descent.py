@@ -16,7 +16,6 @@ from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
 from qlb.system import StageProblem, System
 
-
 SETTLED = 1e-2
 """Part of |g(x_k)|, or of all contact forces where they are more, that may be left where a solve ends by a small step.
 
