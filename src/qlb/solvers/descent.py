@@ -16,7 +16,6 @@ from qlb.solvers.result import IterationRow, Reason, SolveResult
 from qlb.solvers.settings import SolverSettings, Tolerance
 from qlb.system import StageProblem, System
 
-
 SETTLED = 1e-2
 """Part of |g(x_k)|, or of all contact forces where they are more, that may be left where a solve ends by a small step.
 
@@ -65,10 +64,11 @@ class Descent(ABC):
 
     def save(self) -> dict[str, FloatArray]:
         """Arrays that a resumed run needs to go on to the same bits; they must not be changed in place later."""
-        return {}
+        return self.factor.save()
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take back what `save` gave."""
+        self.factor.load(arrays)
 
     def solve(self, problem: StageProblem) -> SolveResult:
         """Minimise the stage's E; where its terms lag something, again with that taken at the solution, till it stays.
@@ -97,7 +97,7 @@ class Descent(ABC):
             result = self.minimise(problem, replace(result, positions=x))
             lead.relaxed(result.positions)
             if not result.reason.converged:
-                break
+                return result if lead.arrived else lead.blocked(result)
         return result
 
     def minimise(self, problem: StageProblem, earlier: SolveResult | None = None) -> SolveResult:

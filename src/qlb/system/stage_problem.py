@@ -14,7 +14,6 @@ from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
 
-
 BENDING = 0.1  # of the stiffness of the bodies, from which on the turning of normals is taken into account
 
 
