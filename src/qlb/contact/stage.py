@@ -153,8 +153,10 @@ class StageContact:
         if self._at_plane is not None:
             node, plane = self._at_plane
             return f"{model.describe(node)}, {model.plane_name(plane)}"
-        nodes = model.candidates.limiting
-        return "" if nodes is None else ", ".join(dict.fromkeys(model.describe(int(node)) for node in nodes))
+        if model.candidates.limiting is None:
+            return ""
+        nodes = np.asarray(model.candidates.limiting)
+        return ", ".join(dict.fromkeys(model.describe(int(node)) for node in nodes))
 
     def _plane_bound(self, x: FloatArray, p: FloatArray, moving_planes: bool) -> float:
         model, self._at_plane = self.model, None

@@ -8,7 +8,7 @@ from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, IntArray
 from qlb.contact.stage import ContactPoint
 from qlb.system import System
-from qlb.system.system import CholeskyKind
+from qlb.system.system import CholeskyKind, Precision
 
 REORDER = 0.02
 """Part of the nodes in contact from which on the order of elimination of the bodies alone is no longer good enough."""
@@ -87,7 +87,7 @@ class ContactMatrix:
         self._keys = _keys(self._pattern)
         touching = len(np.unique(self._stencils))
         order = self._order if touching < REORDER * system.nodes else None
-        precision = getattr(self.cholesky, "precision", "float64")
+        precision: Precision = getattr(self.cholesky, "precision", "float64")
         self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
         self._map = _native.PatternMap(system.pattern, self._pattern)
         self._matrix = _native.BlockMatrix(self._pattern)

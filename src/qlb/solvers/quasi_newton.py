@@ -62,8 +62,9 @@ class QLF(FactoredLbfgs):
     """B is the Hessian at the start of the simulation, for the whole run.
 
     c is part of the Hessian, so a stage with another c (the SDIRK2 step that starts BDF2) has it factorised with its
-    own c, at the same positions. Contact has no part in it: where planes were, and how things slid, is not known any more
-    when it is made again for another c or a resumed run. The supplement names QLF without defining it; this is our reading.
+    own c, at the same positions. Contact has no part in it: when it is made again, for another c or in a resumed run,
+    nothing tells any more where planes were and how things slid. The supplement names QLF without defining it; this is
+    our reading.
     """
 
     name: ClassVar[str] = "QLF"
