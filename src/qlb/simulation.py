@@ -284,6 +284,8 @@ class Simulation:
         solver, solves = self.solver, list[SolveResult]()
         origin = Origin(state.positions, state.time)
         solver.begin_step()
+        if self.system.contact is not None:
+            self.system.contact.stale = True
         stages = integrator.step(state, h)
         stage = next(stages)
         while True:

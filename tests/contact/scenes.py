@@ -33,7 +33,7 @@ UP = (0.0, 1.0, 0.0)
 
 def simulate(bodies: Body | Sequence[Body], *obstacles: Obstacle | Plane, solver: str = "ND", **given) -> Simulation:
     """One thread, contact on, SDIRK2; Newton at its best."""
-    settings = BEST_NEWTON if solver == "ND" else SolverSettings(max_iterations=5000)
+    settings = BEST_NEWTON if solver == "ND" else SolverSettings(max_iterations=1500)
     defaults = {"contact": Contact(), "integrator": "SDIRK2", "threads": 1, "solver_settings": settings}
     return Simulation(bodies, obstacles=obstacles, solver=solver, **(defaults | given))
 

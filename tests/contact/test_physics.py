@@ -187,8 +187,7 @@ def moved(values, turn: Array, by: Array) -> tuple[float, float, float]:
     return tuple((turn @ np.asarray(values) + by).tolist())
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("mu", [0.0, 0.4])
+@pytest.mark.parametrize(("mu", "solver"), [(0.0, "ND"), (0.0, "QLB"), (0.4, "ND")])
 def test_a_scene_turned_and_shifted_does_the_same(mu, solver, rng):
     """A block that lands on one edge on a plane, beside a plate."""
     turn, by = random_rotation(rng), np.array([3.0, -2.0, 5.0])

@@ -65,6 +65,8 @@ class ContactModel:
         allowed = np.ascontiguousarray(may_touch[:groups, :groups], dtype=np.uint8)
         self.surface = _native.ContactSurface(around.rest, around.faces, around.groups, allowed)
         self.candidates = _native.Candidates(self.surface, around.threads)
+        self.stale = True
+        """Whether candidates are of an earlier step: none outlasts one, so that a resumed run finds the same."""
         self.normals: FloatArray = np.array([plane.normal for plane in around.planes]).reshape(-1, 3)
         self.dhat = settings.dhat or self._default_dhat()
         self.stiffness = settings.stiffness or around.young
@@ -117,14 +119,18 @@ class ContactModel:
         first = int(np.argmax(self.around.groups == group))
         return f"{self.around.names[group]} node {node - first}"
 
+    def plane_name(self, plane: int) -> str:
+        """A plane by its name, or its number."""
+        return self.around.names[len(self.around.names) - len(self.around.planes) + plane]
+
     def intersection(self, x: FloatArray, time: float) -> str | None:
         """What passes through what at positions `x` (n, 3) [m], in words; None where nothing does."""
         gaps = self.plane_gaps(x, self.offsets(time))
         if gaps.size and not gaps.min() > 0:
             v, q = np.unravel_index(np.argmin(gaps), gaps.shape)
-            plane = self.around.names[len(self.around.names) - len(self.around.planes) + int(q)]
             count = int((gaps <= 0).sum())
-            return f"{self.describe(self.vertices[v])} is {-gaps[v, q]:.4g} m behind {plane}{_more(count, 'node')}"
+            behind = f"{-gaps[v, q]:.4g} m behind {self.plane_name(int(q))}"
+            return f"{self.describe(self.vertices[v])} is {behind}{_more(count, 'node')}"
         pairs = self.candidates.intersections(x)
         if len(pairs) == 0:
             return None

@@ -75,6 +75,7 @@ class StageContact:
         self._from, self._to = model.offsets(origin.time), model.offsets(stage.time)
         self._offsets = self._from
         self._friction: LaggedFriction | None = None
+        self._at_plane: tuple[int, int] | None = None  # node and plane that bounded the last step
         self.friction_pass = 1
         if model.has_friction:
             self._lag_friction(origin.positions)
@@ -141,8 +142,9 @@ class StageContact:
         candidates, dhat = self.model.candidates, self.model.dhat
         p = np.zeros_like(x) if p is None else p
         with self._timer.section("candidates"):
-            if not candidates.covers(x, p):
+            if self.model.stale or not candidates.covers(x, p):
                 candidates.build(x, p, MARGIN * dhat, dhat)
+                self.model.stale = False
 
     def bound(self, x: FloatArray, p: FloatArray, *, moving_planes: bool = False) -> float:
         """The largest part of a step p (n, 3) [m] from `x` that keeps all gaps open; 1 where the whole step does.
@@ -152,22 +154,40 @@ class StageContact:
         if not self.model.is_barrier:
             return 1.0
         with self._timer.section("candidates"):
-            to_planes = self._plane_bound(x, p, moving_planes)
-        way = p if to_planes == 1 else to_planes * p
+            at_plane = self._plane_bound(x, p, moving_planes)
+        way = p if at_plane == 1 else at_plane * p
         self.cover(x, way)
         with self._timer.section("candidates"):
-            return to_planes * self.model.candidates.step_bound(x, way)
+            between_pairs = self.model.candidates.step_bound(x, way)
+        if between_pairs < 1:
+            self._at_plane = None
+        return at_plane * between_pairs
+
+    def limiting(self) -> str:
+        """What bounded the last step below 1, in words; empty where nothing did."""
+        model = self.model
+        if self._at_plane is not None:
+            node, plane = self._at_plane
+            return f"{model.describe(node)}, {model.plane_name(plane)}"
+        if model.candidates.limiting is None:
+            return ""
+        nodes = np.asarray(model.candidates.limiting)
+        return ", ".join(dict.fromkeys(model.describe(int(node)) for node in nodes))
 
     def _plane_bound(self, x: FloatArray, p: FloatArray, moving_planes: bool) -> float:
-        model = self.model
+        model, self._at_plane = self.model, None
         gaps = model.plane_gaps(x, self._offsets)
         if gaps.size == 0:
             return 1.0
         closing = -(p[model.vertices] @ model.normals.T)
         if moving_planes:
             closing = closing + (self._to - self._offsets)
-        reach = closing > PLANE_SHARE * gaps
-        return float((PLANE_SHARE * gaps[reach] / closing[reach]).min(initial=1.0))
+        parts = np.full(gaps.shape, 1.0)
+        np.divide(PLANE_SHARE * gaps, closing, out=parts, where=closing > PLANE_SHARE * gaps)
+        v, q = np.unravel_index(np.argmin(parts), parts.shape)
+        if parts[v, q] < 1:
+            self._at_plane = int(model.vertices[v]), int(q)
+        return float(parts[v, q])
 
     def _plane_motion(self) -> FloatArray:
         """How far the planes move over c [m], shape (q, 3)."""

@@ -71,11 +71,19 @@ class ContactMatrix:
         found = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
         return np.asarray((self._keys[found] == wanted).all(axis=1))
 
+    @property
+    def stencils(self) -> IntArray:
+        """Contacts that the pattern is extended for, shape (k, 4)."""
+        return self._stencils
+
     def _extend(self, nodes: IntArray) -> None:
         """Analyse anew, for the contacts of now, and those of before while they are not many more."""
-        system = self._system
         kept = self._stencils if len(self._stencils) < 2 * len(nodes) else self._stencils[:0]
-        self._stencils = np.unique(np.concatenate([kept, nodes]), axis=0)
+        self.analyse(np.unique(np.concatenate([kept, nodes]), axis=0))
+
+    def analyse(self, stencils: IntArray) -> None:
+        """Extend the pattern of the bodies for `stencils` (k, 4), distinct and ascending."""
+        system, self._stencils = self._system, stencils
         self._pattern = system.extended_pattern(self._stencils)
         self._keys = _keys(self._pattern)
         touching = len(np.unique(self._stencils))

@@ -64,10 +64,11 @@ class Descent(ABC):
 
     def save(self) -> dict[str, FloatArray]:
         """Arrays that a resumed run needs to go on to the same bits; they must not be changed in place later."""
-        return {}
+        return self.factor.save()
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take back what `save` gave."""
+        self.factor.load(arrays)
 
     def solve(self, problem: StageProblem) -> SolveResult:
         """Minimise the stage's E; where its terms lag something, again with that taken at the solution, till it stays.
@@ -98,7 +99,7 @@ class Descent(ABC):
             result = self.minimise(problem, replace(result, positions=x))
             lead.relaxed(result.positions)
             if not result.reason.converged:
-                break
+                return result if lead.arrived else lead.blocked(result)
         return result
 
     def minimise(self, problem: StageProblem, earlier: SolveResult | None = None) -> SolveResult:

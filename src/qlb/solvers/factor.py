@@ -90,11 +90,26 @@ class Factor:
 
     def _add_contact(self, problem: StageProblem, x: FloatArray, contact: ContactPoint) -> _native.BlockMatrix:
         with problem.timer.section("contact"):
-            if self._with_contact is None:
-                self._with_contact = ContactMatrix(self._system, self._kind, self.cholesky)
-            matrix = self._with_contact.assemble(self._matrix, contact, x)
-            self.cholesky = self._with_contact.cholesky
+            matrix = self._contact_matrix().assemble(self._matrix, contact, x)
+            self.cholesky = self._contact_matrix().cholesky
             return matrix
+
+    def _contact_matrix(self) -> ContactMatrix:
+        if self._with_contact is None:
+            self._with_contact = ContactMatrix(self._system, self._kind, self.cholesky)
+        return self._with_contact
+
+    def save(self) -> dict[str, FloatArray]:
+        """What the pattern was extended for: it decides how the next matrices are factorised, to the bit."""
+        if self._with_contact is None or not len(self._with_contact.stencils):
+            return {}
+        return {"stencils": self._with_contact.stencils.astype(np.float64)}
+
+    def load(self, arrays: dict[str, FloatArray]) -> None:
+        """Take back what `save` gave."""
+        if "stencils" in arrays:
+            self._contact_matrix().analyse(arrays["stencils"].astype(np.int32))
+            self.cholesky = self._contact_matrix().cholesky
 
     def matrix_values(self) -> FloatArray:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""

@@ -28,8 +28,9 @@ class LeadIn:
         self._problem, self._predict = problem, predict
         self._x = problem.origin.positions
         self._move: FloatArray | None = None  # what the free nodes did in the last sub-step, for all of the script
-        self._fraction, self._substeps = 0.0, 0
+        self._fraction = 0.0
         self._history: list[float] = []
+        self._limit = ""  # what was in the way last, in words
         held = problem.system.held.fixed != 0
         assert problem.contact is not None
         self._contact = problem.contact
@@ -52,6 +53,7 @@ class LeadIn:
         parts = [self._contact.bound(x, moves[0], moving_planes=True)]
         if parts[0] < 1 and len(moves) > 1:
             parts.append(self._contact.bound(x, moves[1], moving_planes=True))
+        self._limit = self._contact.limiting() or self._limit
         best = int(np.argmax(parts))
         t, p = parts[best], moves[best]
         if t < 1:
@@ -72,17 +74,15 @@ class LeadIn:
 
     def blocked(self, result: SolveResult) -> SolveResult:
         """The failure of a solve whose script cannot go on."""
-        limiting = self._contact.model.candidates.limiting
-        between = ""
-        if limiting is not None:
-            nodes = list(dict.fromkeys(self._contact.model.describe(int(node)) for node in np.asarray(limiting)))
-            between = f" between {', '.join(nodes)}"
+        between = f" between {self._limit}" if self._limit else ""
         point = result.contact
         gap = point.minimum_distance if point is not None else np.inf
         detail = (
             f"scripted motion can go only {100 * self._fraction:.3g} % of its way without forcing an intersection"
             f"{between}: the smallest gap is {gap:.3g} m"
         )
+        if not result.reason.converged and result.rows:
+            detail += f"; with the script held there the solve ends by {result.reason.value}"
         return replace(result, reason=Reason.MOTION_BLOCKED, detail=detail)
 
     def _is_stuck(self) -> bool:

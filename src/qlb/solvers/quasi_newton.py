@@ -62,7 +62,9 @@ class QLF(FactoredLbfgs):
     """B is the Hessian at the start of the simulation, for the whole run.
 
     c is part of the Hessian, so a stage with another c (the SDIRK2 step that starts BDF2) has it factorised with its
-    own c, at the same positions. The supplement names QLF without defining it; this is our reading.
+    own c, at the same positions. Contact has no part in it: when it is made again, for another c or in a resumed run,
+    nothing tells any more where planes were and how things slid. The supplement names QLF without defining it; this is
+    our reading.
     """
 
     name: ClassVar[str] = "QLF"
@@ -75,16 +77,16 @@ class QLF(FactoredLbfgs):
             self._start = problem.start
         if problem.stage.c != self._c:
             self._c = None  # should the update fail, no factor is in place
-            contact = None if problem.contact is None else problem.contact.at(self._start)
-            self.factor.update(problem, self._start, self.settings.projection, contact)
+            self.factor.update(problem, self._start, self.settings.projection)
             self._c = problem.stage.c
 
     def save(self) -> dict[str, FloatArray]:
         """The positions at which the factor is taken."""
-        return {} if self._start is None else {"start": self._start}
+        return super().save() | ({} if self._start is None else {"start": self._start})
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take the positions back; the factor follows when it is needed."""
+        super().load(arrays)
         self._start, self._c = arrays.get("start"), None
 
 
