@@ -152,14 +152,18 @@ void bind_linalg(nb::module_& m) {
       .def(
           "direction_with",
           [](Lbfgs& h, const Array<const double>& g, InverseOperator& inner, const RankOneTerms& terms,
-             const Array<double>& p, const std::optional<Array<const double>>& beta) {
+             const Array<double>& p, const std::optional<Array<const double>>& beta,
+             const std::optional<Array<const double>>& known) {
             if (inner.size() != h.size()) throw std::invalid_argument("the inner inverse has another size");
-            const auto apart = beta ? std::span<const double>(sized(*beta, terms.size(), "beta"), beta->size())
-                                    : std::span<const double>();
-            return h.direction_with(sized(g, h.size(), "g"), apart, inner, terms, sized(p, h.size(), "p"));
+            const auto per_term = [&](const std::optional<Array<const double>>& values, const char* name) {
+              return values ? std::span<const double>(sized(*values, terms.size(), name), values->size())
+                            : std::span<const double>();
+            };
+            return h.direction_with(sized(g, h.size(), "g"), per_term(beta, "beta"), inner, terms,
+                                    sized(p, h.size(), "p"), per_term(known, "known"));
           },
           nb::arg("g"), nb::arg("inner"), nb::arg("terms"), nb::arg("p").noconvert(), nb::arg("beta") = nb::none(),
-          ReleaseGil(),
+          nb::arg("known") = nb::none(), ReleaseGil(),
           "As direction, for the gradient g + C beta, with y + C K C^T s in place of y in each pair, for terms C K C^T "
           "that the pairs leave out and `inner` takes in.");
 

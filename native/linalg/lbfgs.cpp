@@ -36,7 +36,7 @@ bool Lbfgs::push(const double* x_old, const double* x, const double* g_old, cons
   return true;
 }
 
-void Lbfgs::take_terms(const RankOneTerms& terms) {
+void Lbfgs::take_terms(const RankOneTerms& terms, std::span<const double> known) {
   terms.check_nodes(size_ / 3);
   const std::int64_t count = terms.size();
   with_terms_.resize(count_);
@@ -46,21 +46,22 @@ void Lbfgs::take_terms(const RankOneTerms& terms) {
     with_terms_[k] = curvature_[slot(k)];
     for (std::int64_t j = 0; j < count; ++j) {
       const double along = terms.dot(j, s(k));
+      const double stiffness = known.empty() ? terms.stiffness(j) : known[j];
       along_s_[k * count + j] = along;
-      change_[k * count + j] = terms.stiffness(j) * along;
-      with_terms_[k] += terms.stiffness(j) * along * along;
+      change_[k * count + j] = stiffness * along;
+      with_terms_[k] += stiffness * along * along;
     }
   }
 }
 
 double Lbfgs::direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
-                             const RankOneTerms& terms, double* p) {
+                             const RankOneTerms& terms, double* p, std::span<const double> known) {
   const std::int64_t count = terms.size();
   for (std::int64_t j = 0; j < count; ++j)
     if (terms.stiffness(j) < 0.0)
       throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " +
                                   std::to_string(terms.stiffness(j)) + ", expected at least 0");
-  take_terms(terms);
+  take_terms(terms, known);
   beta_.assign(count, 0.0);
   std::ranges::copy(beta, beta_.begin());
   along_.resize(count);

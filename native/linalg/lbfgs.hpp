@@ -25,9 +25,10 @@ class Lbfgs {
   // The same for g + C beta, with y + C K C^T s in place of each y, for terms that do not take away (structured
   // quasi-Newton: what the pairs hold is the change of the gradient without these terms, and their Hessian of the
   // moment is known). Vectors in the span of C are kept apart by their coefficients all the way: next to stiff terms
-  // the solves of a float32 factor would leave nothing of the rest. beta: one per term, or none.
+  // the solves of a float32 factor would leave nothing of the rest. beta: one per term, or none. known: stiffness of the
+  // terms in the pairs, zero for what the pairs hold themselves; that of the terms if empty.
   double direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
-                        const RankOneTerms& terms, double* p);
+                        const RankOneTerms& terms, double* p, std::span<const double> known = {});
 
   std::int64_t size() const { return size_; }
 
@@ -37,7 +38,7 @@ class Lbfgs {
   // k = 0 is the oldest pair; one slot more than the window, where a new pair waits to be judged.
   std::int64_t slot(int k) const { return (first_ + k) % (window_ + 1); }
 
-  void take_terms(const RankOneTerms& terms);
+  void take_terms(const RankOneTerms& terms, std::span<const double> known);
   std::int64_t size_;
   int window_, threads_;
   int first_ = 0, count_ = 0;

@@ -387,7 +387,7 @@ class Lbfgs:
 
     def direction(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float: ...
 
-    def direction_with(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, terms: RankOneTerms, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> float:
+    def direction_with(self, g: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], inner: InverseOperator, terms: RankOneTerms, p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None, known: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> float:
         """
         As direction, for the gradient g + C beta, with y + C K C^T s in place of y in each pair, for terms C K C^T that the pairs leave out and `inner` takes in.
         """

@@ -23,7 +23,7 @@ from qlb import (
 from qlb.integrators.sdirk2 import A
 from tests.support import Array
 
-SOLVERS = ["ND", "QLB"]
+SOLVERS = ["ND", "QLB", "QLA"]
 BEST_NEWTON = SolverSettings(projection="on-demand", initial_guess="predictor")
 BY_GRADIENT = Tolerance(relative=1e-7, step=0.0)
 SOFT = StableNeoHookean(young=2e4, poisson=0.4, density=1000)

@@ -10,7 +10,7 @@ from tests.simulation.test_repeatability import assert_same_bits, resumed
 from tests.support import finish
 
 STEPS = 9
-SOLVERS = ["ND", pytest.param("QLF", marks=pytest.mark.slow), "QLB"]
+SOLVERS = ["ND", pytest.param("QLF", marks=pytest.mark.slow), "QLB", "QLA"]
 
 
 def two_cubes(solver: str, threads: int = 1) -> Simulation:

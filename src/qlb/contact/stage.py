@@ -15,6 +15,7 @@ from qlb.integrators.integrator import Origin, Stage
 from qlb.timing import Timer
 
 PLANE_SHARE = 0.9  # of the way to a plane that a step may go
+ALONG = 0.2  # of friction's stiffness across the sliding, what its model has along it at least
 MARGIN = 0.25  # of dhat, by which candidates outlast the motion that they were searched for
 
 
@@ -41,19 +42,23 @@ class ContactPoint:
     """shape (n, 3), held nodes included: minus the forces, times c^2"""
     contacts: _native.ContactSet
     friction: _native.FrictionTerms | None = None
+    sliding: FloatArray | None = None
+    """the part of the gradient that is friction's, shape (n, 3)"""
 
     def terms(self) -> Terms:
         """The Hessian along the normals, then that of friction, as a sum of k a a^T: nodes, a, k.
 
-        Friction has the stiffness mu lambda f1(u)/u in all directions of sliding, also along u where the Hessian has
-        less, or nothing: that quadratic lies above its potential, so that a step does not go too far.
+        Friction has the stiffness mu lambda f1(u)/u across the sliding u, and at least a part of that along it, where
+        the Hessian has nothing once a contact slides: with all of it the quadratic would lie above its potential, with
+        nothing a step that turns u round goes too far.
         """
         c, f = self.contacts, self.friction
         normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
         if f is None:
             return normal
-        across = np.repeat(f.stiffness[1::2], 2)
-        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], across))
+        stiffness = f.stiffness.copy()
+        stiffness[::2] = np.maximum(f.stiffness[::2], ALONG * f.stiffness[1::2])
+        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], stiffness))
 
     @property
     def count(self) -> int:
@@ -116,8 +121,9 @@ class StageContact:
             friction = None if self._friction is None else self._friction.whole
             if friction is None:
                 return ContactPoint(contacts.energy, gradient, contacts)
-            terms = self._slide(friction, x, gradient)
-            return ContactPoint(contacts.energy + terms.energy, gradient, contacts, terms)
+            sliding = np.zeros_like(x)
+            terms = self._slide(friction, x, sliding)
+            return ContactPoint(contacts.energy + terms.energy, gradient + sliding, contacts, terms, sliding)
 
     def forces(self, x: FloatArray, point: ContactPoint) -> ContactForces:
         """Forces at positions `x` (n, 3) [m], where contact was found to be `point`."""

@@ -97,13 +97,12 @@ class QLA(FactoredLbfgs):
         if self._low_rank is None or point.contact is None:
             return super().direction(problem, point)
         with problem.timer.section("contact"):
-            terms, rest, forces = _split(problem, point, point.contact)
+            terms, known, rest, forces = _split(problem, point, point.contact)
             self._low_rank.set_terms(terms)
-            self._terms = terms
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
-            slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces)
-            self._p = p
+            slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces, known)
+            self._p, self._known = p, _native.RankOneTerms(terms.nodes, terms.vectors, known)
             return p, slope
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
@@ -112,28 +111,30 @@ class QLA(FactoredLbfgs):
         Where contact limits a step it is still being found, which a new factor does not shorten: contraction counts
         from the last such step.
         """
-        smooth = new.smooth if old.contact is None else self._damped(problem, old, new)
-        self.history.push(old.x, new.x, old.smooth, smooth)
+        if old.contact is None:
+            self.history.push(old.x, new.x, old.smooth, new.smooth)
+        else:
+            y = _secant_gradient(new) - _secant_gradient(old)
+            self.history.push(old.x, new.x, np.zeros_like(y), self._damped(problem, old, new.x - old.x, y))
         self._iterations += 1
         if limited:
             self._mark(new)
 
-    def _damped(self, problem: StageProblem, old: Point, new: Point) -> FloatArray:
-        """The new gradient without contact, changed where its change would soften the model too much at once.
+    def _damped(self, problem: StageProblem, old: Point, s: FloatArray, y: FloatArray) -> FloatArray:
+        """The change y of the gradient over a step s, altered where it would soften the model too much at once.
 
-        Powell 1978: y is mixed with B s until s.y >= 0.2 s.B s, B being the model without contact: B s follows from
-        (B + C K C^T) p = -g.
+        Powell 1978: y is mixed with B s until s.y >= 0.2 s.B s, B being the model without the terms that pairs leave
+        out: B s follows from (B + C K C^T) p = -g.
         """
-        s = new.x - old.x
-        t = problem.system.norm(s) / problem.system.norm(self._p)
-        Bs = -t * old.gradient
-        self._terms.add_product(s, Bs, -1.0)
-        problem.system.clear_held(Bs)
-        sBs, sy = problem.system.dot(s, Bs), problem.system.dot(s, new.smooth - old.smooth)
+        system = problem.system
+        Bs = -system.norm(s) / system.norm(self._p) * old.gradient
+        self._known.add_product(s, Bs, -1.0)
+        system.clear_held(Bs)
+        sBs, sy = system.dot(s, Bs), system.dot(s, y)
         if sy >= DAMPING * sBs:
-            return new.smooth
+            return y
         share = (1 - DAMPING) * sBs / (sBs - sy)
-        return old.smooth + share * (new.smooth - old.smooth) + (1 - share) * Bs
+        return share * y + (1 - share) * Bs
 
     def end_solve(self) -> None:
         """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
@@ -211,18 +212,29 @@ class QLA(FactoredLbfgs):
 
 def _split(
     problem: StageProblem, point: Point, contact: ContactPoint
-) -> tuple[_native.RankOneTerms, FloatArray, FloatArray]:
-    """Terms of the Hessian of contact, and the gradient as a rest (n, 3) minus forces (k,) along the terms.
+) -> tuple[_native.RankOneTerms, FloatArray, FloatArray, FloatArray]:
+    """Terms of the Hessian of contact, their stiffness in pairs, and the gradient as a rest minus forces along terms.
 
-    Beside stiff contacts the forces are kept apart from the rest: their sum would drown it in single precision.
+    Beside stiff contacts the forces are kept apart from the rest: their sum would drown it in single precision. Pairs
+    hold the change of friction themselves, since its terms are an upper bound.
     """
     nodes, vectors, stiffness = problem.contact_terms(point.x, contact)
     terms = _native.RankOneTerms(nodes, vectors, stiffness)
+    known = stiffness.copy()
+    if contact.friction is not None:
+        known[contact.count : contact.count + len(contact.friction.stiffness)] = 0.0
     forces = np.zeros(terms.size)
     forces[: contact.count] = contact.contacts.force
     rest = point.gradient.copy()
     terms.add_combination(forces, rest)
-    return terms, problem.system.clear_held(rest), forces
+    return terms, known, problem.system.clear_held(rest), forces
+
+
+def _secant_gradient(point: Point) -> FloatArray:
+    """The gradient that pairs hold the change of: without contact, but with friction."""
+    if point.contact is None or point.contact.sliding is None:
+        return point.smooth
+    return point.smooth + point.contact.sliding
 
 
 def stretch_weight(incompressibility: float) -> float:
