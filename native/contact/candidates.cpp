@@ -85,9 +85,9 @@ void Candidates::set_slack(double slack) {
 
 void Candidates::check_finite(const double* values, const char* name) const {
   Vec3 sum;  // of zeros, unless one is not finite
-  for (const std::int32_t node : trees_.nodes) sum = sum + 0.0 * node_vector(values, node);
+  for (const std::int32_t node : surface_->vertices()) sum = sum + 0.0 * node_vector(values, node);
   if (sum.x + sum.y + sum.z == 0.0) return;
-  for (const std::int32_t node : trees_.nodes) {
+  for (const std::int32_t node : surface_->vertices()) {
     const Vec3 v = node_vector(values, node);
     if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
       throw std::invalid_argument(std::string(name) + " of node " + std::to_string(node) + " is not finite");

@@ -27,31 +27,40 @@ unsigned meets(const LeafBoxes& boxes, const float lo[3], const float hi[3]) {
   return hits;
 }
 
-void overlaps(const LeafBoxes& a, const LeafBoxes& b, const float around[6], std::uint16_t hits[kLeaf]) {
-  const unsigned near = meets(a, around, around + 3);
-  for (int i = 0; i < kLeaf; ++i) {
-    hits[i] = 0;
-    if ((near >> i & 1) == 0) continue;
+unsigned overlaps(const LeafBoxes& a, const LeafBoxes& b, const float around[6], std::uint16_t hits[kLeaf]) {
+  unsigned left = 0;
+  for (unsigned near = meets(a, around, around + 3); near != 0; near &= near - 1) {
+    const int i = __builtin_ctz(near);
     const float lo[3] = {a.lo[0][i], a.lo[1][i], a.lo[2][i]}, hi[3] = {a.hi[0][i], a.hi[1][i], a.hi[2][i]};
-    hits[i] = static_cast<std::uint16_t>(meets(b, lo, hi));
+    const unsigned found = meets(b, lo, hi);
+    hits[i] = static_cast<std::uint16_t>(found);
+    left |= static_cast<unsigned>(found != 0) << i;
   }
+  return left;
 }
 
-void drop_shared(const LeafNodes& a, int corners_a, const LeafNodes& b, int corners_b, std::uint16_t hits[kLeaf]) {
-  for (int i = 0; i < kLeaf; ++i) {
-    if (hits[i] == 0) continue;
+template <int corners_a, int corners_b>
+unsigned drop_shared(const LeafNodes& a, const LeafNodes& b, unsigned which, std::uint16_t hits[kLeaf]) {
+  unsigned left = 0;
+  for (; which != 0; which &= which - 1) {
+    const int i = __builtin_ctz(which);
     unsigned shared = 0;
-    for (int k = 0; k < corners_a; ++k) {
-      const Ints node(a.corner[k][i]);
-      for (int l = 0; l < corners_b; ++l)
-        for (int j = 0; j < kLeaf; j += kFloats) shared |= lane_bits(node == Ints::load_aligned(&b.corner[l][j])) << j;
+    for (int j = 0; j < kLeaf; j += kFloats) {
+      auto same = Ints(a.corner[0][i]) == Ints::load_aligned(&b.corner[0][j]);
+      for (int k = 0; k < corners_a; ++k)
+        for (int l = k == 0 ? 1 : 0; l < corners_b; ++l)
+          same = same | (Ints(a.corner[k][i]) == Ints::load_aligned(&b.corner[l][j]));
+      shared |= lane_bits(same) << j;
     }
-    hits[i] = static_cast<std::uint16_t>(hits[i] & ~shared);
+    const unsigned found = hits[i] & ~shared;
+    hits[i] = static_cast<std::uint16_t>(found);
+    left |= static_cast<unsigned>(found != 0) << i;
   }
+  return left;
 }
 
 constexpr PairKernels kKernels = {overlaps,
-                                  drop_shared,
+                                  {drop_shared<1, 3>, drop_shared<2, 2>, drop_shared<2, 3>},
                                   {planes::apart_in_boxes<Vec, 1>, planes::apart_in_boxes<Vec, 2>},
                                   {planes::apart_on_way<Vec, 1>, planes::apart_on_way<Vec, 2>}};
 

@@ -26,9 +26,11 @@ struct alignas(64) PairMotion {
 
 struct PairKernels {
   // hits[i], bit j: box i of a and box j of b have a common point. `around`: the least box about all of b, lo then hi.
-  void (*overlaps)(const LeafBoxes& a, const LeafBoxes& b, const float around[6], std::uint16_t hits[kLeaf]);
-  // Clears the bits of primitives, with as many corners each, that have a node in common.
-  void (*drop_shared)(const LeafNodes& a, int corners_a, const LeafNodes& b, int corners_b, std::uint16_t hits[kLeaf]);
+  // Returns the i for which there is one, as bits; only their hits are set.
+  unsigned (*overlaps)(const LeafBoxes& a, const LeafBoxes& b, const float around[6], std::uint16_t hits[kLeaf]);
+  // Clears the bits of primitives that have a node in common, of the i in `which`; returns those that have bits left.
+  // For vertices and faces, edges and edges, edges and faces.
+  unsigned (*drop_shared[3])(const LeafNodes& a, const LeafNodes& b, unsigned which, std::uint16_t hits[kLeaf]);
   // Bit k: two planes are found, more than `distance` apart, that have the first primitive of pair k beyond one and
   // the second beyond the other, wherever in their boxes their nodes are.
   unsigned (*apart_in_boxes[2])(const PairMotion& boxes, double distance);  // by first - 1

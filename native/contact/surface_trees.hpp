@@ -91,14 +91,16 @@ template <std::size_t A, std::size_t B>
 void find_near(const TreePair<A, B>& trees, std::int32_t leaf, std::vector<Pair>& places) {
   const auto& [a, b] = trees;
   const bool same = static_cast<const void*>(a) == static_cast<const void*>(b);
+  constexpr int kKinds = static_cast<int>(A + B == 4 ? A - 1 : 2);
   const PairKernels& kernels = pair_kernels();
   a->tree.near(leaf, b->tree, same ? leaf : 0, [&](std::int32_t other) {
     const SmallBox& box = b->tree.around(other);
     const float around[6] = {box.lo[0], box.lo[1], box.lo[2], box.hi[0], box.hi[1], box.hi[2]};
     alignas(64) std::uint16_t hits[kLeaf];
-    kernels.overlaps(a->tree.boxes(leaf), b->tree.boxes(other), around, hits);
-    kernels.drop_shared(a->leaf_slots[leaf], A, b->leaf_slots[other], B, hits);
-    for (std::int32_t i = 0; i < kLeaf; ++i) {
+    unsigned which = kernels.overlaps(a->tree.boxes(leaf), b->tree.boxes(other), around, hits);
+    which = kernels.drop_shared[kKinds](a->leaf_slots[leaf], b->leaf_slots[other], which, hits);
+    for (; which != 0; which &= which - 1) {
+      const std::int32_t i = std::countr_zero(which);
       unsigned found = hits[i];
       if (same && leaf == other) found &= ~0u << i;
       for (; found != 0; found &= found - 1)
