@@ -4,13 +4,13 @@
 #include <xsimd/xsimd.hpp>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "contact/pair_kernels.hpp"
 #include "contact/vec3.hpp"
 
 namespace qlb {
@@ -49,19 +49,12 @@ struct alignas(16) SmallBox {
     xsimd::min(low(), b.low()).store_aligned(lo);
     xsimd::max(high(), b.high()).store_aligned(hi);
   }
-  SmallBox grown(double by) const {
-    constexpr float kError = 2e-7f;  // above the rounding of a float sum
-    const Lanes distance(round_up(by));
-    SmallBox box;
-    (low() - (distance + kError * (distance + xsimd::abs(low())))).store_aligned(box.lo);
-    (high() + (distance + kError * (distance + xsimd::abs(high())))).store_aligned(box.hi);
-    return box;
-  }
 
  private:
+  // The nearest float and a little more than one unit in its last place.
   static float round_up(double value) {
     const auto nearest = static_cast<float>(value);
-    return static_cast<double>(nearest) < value ? std::nextafter(nearest, kInfinity) : nearest;
+    return nearest + (std::abs(nearest) * std::numeric_limits<float>::epsilon() + std::numeric_limits<float>::min());
   }
   static float round_down(double value) { return -round_up(-value); }
 };
@@ -70,15 +63,14 @@ inline bool overlap(const SmallBox& a, const SmallBox& b) {
   return xsimd::all((a.low() <= b.high()) & (b.low() <= a.high()));
 }
 
-// Nodes lie in depth-first order, so that a query is one loop without a stack: on, or past a subtree it misses.
+// Nodes lie in depth-first order, so that a query is one loop without a stack: on, or past a subtree it misses. All
+// leaves but the last are full: place k is in leaf k / kLeaf.
 class AabbTree {
  public:
-  static constexpr std::int32_t kLeaf = 16;  // primitives in a leaf, at most
-
   struct Node {
     SmallBox box;
-    std::int32_t skip = 0;              // the node after this subtree
-    std::int32_t first = 0, count = 0;  // of a leaf: its primitives, as places; count = 0 inside the tree
+    std::int32_t skip = 0;   // the node after this subtree
+    std::int32_t leaf = -1;  // its number, -1 inside the tree
   };
 
   AabbTree() = default;
@@ -87,51 +79,53 @@ class AabbTree {
 
   // Place k of the tree holds primitive order()[k].
   const std::vector<std::int32_t>& order() const { return order_; }
-  const std::vector<std::int32_t>& leaves() const { return leaves_; }  // nodes, ascending
+  std::int32_t leaves() const { return static_cast<std::int32_t>(leaf_nodes_.size()); }
+  const LeafBoxes& boxes(std::int32_t leaf) const { return boxes_[leaf]; }
+  const SmallBox& around(std::int32_t leaf) const { return nodes_[leaf_nodes_[leaf]].box; }
   const SmallBox& bounds() const { return nodes_.front().box; }
   bool empty() const { return nodes_.empty(); }
 
   // box_of(place) for every place, then the boxes of all nodes.
   template <class BoxOf>
   void refit(const BoxOf& box_of) {
-    for (std::size_t k = 0; k < order_.size(); ++k) boxes_[k] = box_of(k);
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      const SmallBox box = box_of(k);
+      set_box(k, box);
+      SmallBox& around = nodes_[leaf_nodes_[k / kLeaf]].box;
+      if (k % kLeaf == 0) around = SmallBox{};
+      around.add(box);
+    }
     refit_nodes();
   }
 
-  // visit(a, b) for each place a of the leaf `leaf` of this tree and each place b of `other`, at its node `start` or
-  // later, whose boxes are within `distance` of each other (infinity norm).
+  // visit(b) for each leaf of `other`, from its leaf `start` on, whose box has a point in common with that of `leaf`.
   template <class Visit>
-  void near(std::int32_t leaf, const AabbTree& other, std::int32_t start, double distance, const Visit& visit) const {
-    const Node& mine = nodes_[leaf];
-    const SmallBox around = mine.box.grown(distance);
-    SmallBox box[kLeaf];
-    for (std::int32_t a = 0; a < mine.count; ++a) box[a] = boxes_[mine.first + a].grown(distance);
+  void near(std::int32_t leaf, const AabbTree& other, std::int32_t start, const Visit& visit) const {
+    const SmallBox box = around(leaf);
     const auto end = static_cast<std::int32_t>(other.nodes_.size());
-    for (std::int32_t i = start; i < end;) {
+    for (std::int32_t i = start == 0 ? 0 : other.leaf_nodes_[start]; i < end;) {
       const Node& node = other.nodes_[i];
-      if (!overlap(around, node.box)) {
-        i = node.skip;
-        continue;
-      }
-      for (std::int32_t a = 0; node.count > 0 && a < mine.count; ++a) {
-        if (!overlap(box[a], node.box)) continue;
-        // All tests before any visit: branches on each would be mispredicted half the time.
-        unsigned hits = 0;
-        for (std::int32_t b = 0; b < node.count; ++b)
-          hits |= static_cast<unsigned>(overlap(box[a], other.boxes_[node.first + b])) << b;
-        for (; hits != 0; hits &= hits - 1) visit(mine.first + a, node.first + std::countr_zero(hits));
-      }
-      ++i;
+      const bool hit = overlap(box, node.box);
+      if (hit && node.leaf >= 0) visit(node.leaf);
+      i = hit ? i + 1 : node.skip;
     }
   }
 
  private:
   void split(std::span<const Vec3> centres, std::int32_t first, std::int32_t last);
   void refit_nodes();
+  void set_box(std::size_t place, const SmallBox& box) {
+    LeafBoxes& leaf = boxes_[place / kLeaf];
+    for (int d = 0; d < 3; ++d) {
+      leaf.lo[d][place % kLeaf] = box.lo[d];
+      leaf.hi[d][place % kLeaf] = box.hi[d];
+    }
+  }
 
   std::vector<Node> nodes_;
-  std::vector<SmallBox> boxes_;
-  std::vector<std::int32_t> order_, leaves_;
+  std::vector<LeafBoxes> boxes_;          // of each leaf
+  std::vector<std::int32_t> leaf_nodes_;  // of each leaf, ascending
+  std::vector<std::int32_t> order_;
 };
 
 }  // namespace qlb

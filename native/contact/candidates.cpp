@@ -1,6 +1,7 @@
 #include "contact/candidates.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -29,47 +30,46 @@ std::array<Vec3, 4> load_motion(const double* p, const std::array<std::int32_t, 
   return {node_vector(p, nodes[0]), node_vector(p, nodes[1]), node_vector(p, nodes[2]), node_vector(p, nodes[3])};
 }
 
-// Boxes of the four nodes of a pair, of which [0, first) are the first primitive.
-template <int first>
-struct BoxPair {
-  std::array<Vec3, 4> centre, half;
+template <class T, std::size_t A, std::size_t B>
+std::array<T, 4> join(const std::array<T, A>& a, const std::array<T, B>& b) {
+  static_assert(A + B == 4);
+  std::array<T, 4> both;
+  std::ranges::copy(b, std::ranges::copy(a, both.begin()).out);
+  return both;
+}
 
-  explicit BoxPair(const std::array<const Box*, 4>& boxes) {
-    for (int i = 0; i < 4; ++i) {
-      centre[i] = 0.5 * (boxes[i]->lo + boxes[i]->hi);
-      half[i] = 0.5 * (boxes[i]->hi - boxes[i]->lo);
-    }
-  }
+void set_lane(double to[3][kPairs], int lane, Vec3 v) {
+  to[0][lane] = v.x;
+  to[1][lane] = v.y;
+  to[2][lane] = v.z;
+}
 
-  // Whether two planes normal to n, more than `distance` apart, have the first primitive beyond one and the second
-  // beyond the other.
-  bool separated_along(Vec3 n, double distance) const {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (int i = 0; i < 4; ++i) {
-      const double height = dot(n, centre[i]);
-      const double reach = std::abs(n.x) * half[i].x + std::abs(n.y) * half[i].y + std::abs(n.z) * half[i].z;
-      if (i < first) {
-        low = std::min(low, height - reach);
-      } else {
-        high = std::max(high, height + reach);
+// Takes out the pairs for which planes are found that keep all of the boxes of one primitive more than `distance` from
+// those of the other. boxes: of each slot.
+template <std::size_t A, std::size_t B>
+void drop_separated(const TreePair<A, B>& trees, const std::vector<Box>& boxes, double distance,
+                    std::vector<Pair>& places) {
+  const auto apart = pair_kernels().apart_in_boxes[A - 1];
+  std::size_t kept = 0;
+  PairMotion motion{};
+  for (std::size_t first = 0; first < places.size(); first += kPairs) {
+    const int count = static_cast<int>(std::min<std::size_t>(kPairs, places.size() - first));
+    for (int lane = 0; lane < count; ++lane) {
+      const auto& [i, j] = places[first + lane];
+      const auto slots = join(trees.a->slots[i], trees.b->slots[j]);
+      for (int node = 0; node < 4; ++node) {
+        set_lane(motion.a[node], lane, boxes[slots[node]].lo);
+        set_lane(motion.b[node], lane, boxes[slots[node]].hi);
       }
     }
-    return low - high > distance * norm(n);
+    const unsigned far = apart(motion, distance);
+    for (int lane = 0; lane < count; ++lane) {
+      const Pair pair = places[first + lane];
+      places[kept] = pair;
+      kept += ~far >> lane & 1;
+    }
   }
-
-  Vec3 between_middles() const {
-    if constexpr (first == 1) return centre[0] - (1.0 / 3.0) * (centre[1] + centre[2] + centre[3]);
-    return 0.5 * (centre[0] + centre[1] - centre[2] - centre[3]);
-  }
-};
-
-// Whether planes are found that keep all of the boxes of one primitive more than `distance` from those of the other:
-// normal to the line of the middles, which is quick, or to that of the closest points, both for the boxes' centres.
-template <int first>
-bool separated(const std::array<const Box*, 4>& boxes, double distance) {
-  const BoxPair<first> pair(boxes);
-  return pair.separated_along(pair.between_middles(), distance) ||
-         pair.separated_along(closest_points<first>(pair.centre).apart, distance);
+  places.resize(kept);
 }
 
 }  // namespace
@@ -84,7 +84,10 @@ void Candidates::set_slack(double slack) {
 }
 
 void Candidates::check_finite(const double* values, const char* name) const {
-  for (const std::int32_t node : trees_.nodes) {
+  Vec3 sum;  // of zeros, unless one is not finite
+  for (const std::int32_t node : surface_->vertices()) sum = sum + 0.0 * node_vector(values, node);
+  if (sum.x + sum.y + sum.z == 0.0) return;
+  for (const std::int32_t node : surface_->vertices()) {
     const Vec3 v = node_vector(values, node);
     if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
       throw std::invalid_argument(std::string(name) + " of node " + std::to_string(node) + " is not finite");
@@ -148,16 +151,15 @@ void Candidates::find_pairs(const std::vector<Box>& boxes, bool within_groups, d
       if (g <= h) edge_edges.push_back({&a.edges, &b.edges});
     }
   if (vertex_faces.empty()) return;
-  const std::vector<SmallBox> small(boxes.begin(), boxes.end());
+  std::vector<SmallBox> small;  // that meet where the boxes are within the radius
+  small.reserve(boxes.size());
+  for (const Box& box : boxes) small.emplace_back(box.grown(0.5 * radius));
   for (GroupTrees& group : trees_.groups)
     if (within_groups ? group.meets_itself : group.meets_others) group.refit(small);
-  search(vertex_faces, radius, collector_, vertex_faces_, [&](const auto& a, const auto& b) {
-    return !separated<1>({&boxes[a[0]], &boxes[b[0]], &boxes[b[1]], &boxes[b[2]]}, radius);
-  });
+  const auto keep = [&](const auto& trees, std::vector<Pair>& places) { drop_separated(trees, boxes, radius, places); };
+  search(vertex_faces, collector_, vertex_faces_, keep);
   const std::size_t known = edge_edges_.size();
-  search(edge_edges, radius, collector_, edge_edges_, [&](const auto& a, const auto& b) {
-    return !separated<2>({&boxes[a[0]], &boxes[a[1]], &boxes[b[0]], &boxes[b[1]]}, radius);
-  });
+  search(edge_edges, collector_, edge_edges_, keep);
   for (std::size_t k = known; k < edge_edges_.size(); ++k)
     if (edge_edges_[k][0] > edge_edges_[k][1]) std::swap(edge_edges_[k][0], edge_edges_[k][1]);
 }
@@ -192,23 +194,44 @@ std::array<std::int32_t, 4> Candidates::pair_nodes(std::int64_t pair) const {
   return {edges[e][0], edges[e][1], edges[f][0], edges[f][1]};
 }
 
+unsigned Candidates::pairs_in_the_way(const double* x, const double* p, std::int64_t begin, std::int64_t end) const {
+  PairMotion motion{};
+  const int count = static_cast<int>(end - begin), first = begin < vertex_face_count() ? 1 : 2;
+  for (int lane = 0; lane < count; ++lane) {
+    const auto nodes = pair_nodes(begin + lane);
+    const auto start = load_positions(x, nodes), way = load_motion(p, nodes);
+    for (int node = 0; node < 4; ++node) {
+      set_lane(motion.a[node], lane, start[node]);
+      set_lane(motion.b[node], lane, start[node] + way[node]);
+    }
+  }
+  return ~pair_kernels().apart_on_way[first - 1](motion, slack_) & ((1u << count) - 1);
+}
+
 double Candidates::step_bound(const double* x, const double* p) {
   check_finite(x, "x");
   check_finite(p, "p");
   using Bound = std::pair<double, std::int64_t>;  // the step and, among equals, the first pair
-  const auto count = pairs(), faces = static_cast<std::int64_t>(vertex_faces_.size());
+  const auto count = pairs(), faces = vertex_face_count();
+  const auto face_batches = (faces + kPairs - 1) / kPairs, edge_batches = (count - faces + kPairs - 1) / kPairs;
   Bound least{1.0, -1};
 #pragma omp parallel num_threads(threads_) if (count > kWorthThreads)
   {
     // A pair is given up once it is above the least bound this thread has seen, which cannot change the minimum.
     Bound mine{1.0, -1};
 #pragma omp for schedule(static) nowait
-    for (std::int64_t pair = 0; pair < count; ++pair) {
-      const auto nodes = pair_nodes(pair);
-      const auto start = load_positions(x, nodes), motion = load_motion(p, nodes);
-      const double step = pair < faces ? additive_ccd<1>(start, motion, slack_, mine.first)
-                                       : additive_ccd<2>(start, motion, slack_, mine.first);
-      mine = step < mine.first ? Bound{step, pair} : mine;
+    for (std::int64_t batch = 0; batch < face_batches + edge_batches; ++batch) {
+      const bool of_faces = batch < face_batches;
+      const auto begin = of_faces ? kPairs * batch : faces + kPairs * (batch - face_batches);
+      const auto end = std::min(begin + kPairs, of_faces ? faces : count);
+      for (unsigned left = pairs_in_the_way(x, p, begin, end); left != 0; left &= left - 1) {
+        const auto pair = begin + std::countr_zero(left);
+        const auto nodes = pair_nodes(pair);
+        const auto start = load_positions(x, nodes), motion = load_motion(p, nodes);
+        const double step = of_faces ? additive_ccd<1>(start, motion, slack_, mine.first)
+                                     : additive_ccd<2>(start, motion, slack_, mine.first);
+        mine = step < mine.first ? Bound{step, pair} : mine;
+      }
     }
 #pragma omp critical(qlb_step_bound)
     if (mine.second >= 0) least = std::min(least, mine);

@@ -55,8 +55,10 @@ class Candidates {
   void find_pairs(const std::vector<Box>& boxes, bool within_groups, double radius);
   void check_finite(const double* values, const char* name) const;
   std::array<std::int32_t, 4> pair_nodes(std::int64_t pair) const;
-  template <class Visit>
-  void visit_pair(std::int64_t pair, const Visit& visit) const;
+  // Of pairs [begin, end), up to kPairs of one kind: a bit for each for which no planes were found that stay between
+  // its primitives, the slack apart, all along x -> x + p.
+  unsigned pairs_in_the_way(const double* x, const double* p, std::int64_t begin, std::int64_t end) const;
+  std::int64_t vertex_face_count() const { return static_cast<std::int64_t>(vertex_faces_.size()); }
   std::int64_t pairs() const { return static_cast<std::int64_t>(vertex_faces_.size() + edge_edges_.size()); }
 
   std::shared_ptr<const ContactSurface> surface_;

@@ -69,8 +69,12 @@ std::vector<Pair> Candidates::intersections(const double* x) {
     for (std::int32_t h = 0; h < count; ++h)
       if (surface_->allowed(g, h)) trees.push_back({&trees_.groups[g].edges, &trees_.groups[h].faces});
   std::vector<Pair> found;
-  search(trees, 0.0, collector_, found, [&](const auto& edge, const auto& face) {
-    return segment_meets_triangle(at(edge[0]), at(edge[1]), at(face[0]), at(face[1]), at(face[2]));
+  search(trees, collector_, found, [&](const auto& pair, std::vector<Pair>& places) {
+    std::erase_if(places, [&](const Pair& place) {
+      const auto& edge = pair.a->slots[place[0]];
+      const auto& face = pair.b->slots[place[1]];
+      return !segment_meets_triangle(at(edge[0]), at(edge[1]), at(face[0]), at(face[1]), at(face[2]));
+    });
   });
   return found;
 }

@@ -1,5 +1,6 @@
 #include "contact/surface_trees.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -28,6 +29,12 @@ template <std::size_t width>
 void number_by_slot(PrimitiveTree<width>& tree, const std::vector<std::int32_t>& slot_of_node) {
   for (auto& corners : tree.slots)
     for (std::int32_t& node : corners) node = slot_of_node[node];
+  LeafNodes none;
+  for (auto& corner : none.corner) std::ranges::fill(corner, -1);
+  tree.leaf_slots.assign(tree.tree.leaves(), none);
+  for (std::size_t place = 0; place < tree.slots.size(); ++place)
+    for (std::size_t k = 0; k < width; ++k)
+      tree.leaf_slots[place / kLeaf].corner[k][place % kLeaf] = tree.slots[place][k];
 }
 
 template <std::size_t width>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -17,6 +18,7 @@ struct PrimitiveTree {
   AabbTree tree;
   std::vector<std::array<std::int32_t, width>> slots;  // of the primitive at each place of the tree
   std::vector<std::int32_t> ids;                       // node, edge or face at each place
+  std::vector<LeafNodes> leaf_slots;                   // those of each leaf
 
   // boxes: of each slot
   void refit(const std::vector<SmallBox>& boxes) {
@@ -58,7 +60,7 @@ struct TreePair {
 
 using Pair = std::array<std::int32_t, 2>;
 
-// Runs find(k, found) for k < count in parallel; `found` of all are appended to `out` in the order of k.
+// Runs find(begin, end, found) for parts of [0, count) in parallel; `found` of all are appended to `out` in order.
 class OrderedCollector {
  public:
   explicit OrderedCollector(int threads) : threads_(threads), parts_(8 * threads) {}
@@ -66,14 +68,14 @@ class OrderedCollector {
   template <class Find>
   void collect(std::int64_t count, std::vector<Pair>& out, const Find& find) {
     if (threads_ == 1) {
-      for (std::int64_t k = 0; k < count; ++k) find(k, out);
+      find(0, count, out);
       return;
     }
     const auto parts = static_cast<std::int64_t>(parts_.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_)
     for (std::int64_t part = 0; part < parts; ++part) {
       parts_[part].clear();
-      for (std::int64_t k = part * count / parts; k < (part + 1) * count / parts; ++k) find(k, parts_[part]);
+      find(part * count / parts, (part + 1) * count / parts, parts_[part]);
     }
     for (const auto& part : parts_) out.insert(out.end(), part.begin(), part.end());
   }
@@ -83,36 +85,55 @@ class OrderedCollector {
   std::vector<std::vector<Pair>> parts_;
 };
 
+// Appends the places of all pairs, one of leaf `leaf` of a, one of b, that share no node and whose boxes meet. Where a
+// is b, only pairs (i, j) with i < j.
 template <std::size_t A, std::size_t B>
-bool share_a_node(const std::array<std::int32_t, A>& a, const std::array<std::int32_t, B>& b) {
-  bool shared = false;
-  for (const std::int32_t i : a)
-    for (const std::int32_t j : b) shared |= i == j;
-  return shared;
+void find_near(const TreePair<A, B>& trees, std::int32_t leaf, std::vector<Pair>& places) {
+  const auto& [a, b] = trees;
+  const bool same = static_cast<const void*>(a) == static_cast<const void*>(b);
+  constexpr int kKinds = static_cast<int>(A + B == 4 ? A - 1 : 2);
+  const PairKernels& kernels = pair_kernels();
+  a->tree.near(leaf, b->tree, same ? leaf : 0, [&](std::int32_t other) {
+    const SmallBox& box = b->tree.around(other);
+    const float around[6] = {box.lo[0], box.lo[1], box.lo[2], box.hi[0], box.hi[1], box.hi[2]};
+    alignas(64) std::uint16_t hits[kLeaf];
+    unsigned which = kernels.overlaps(a->tree.boxes(leaf), b->tree.boxes(other), around, hits);
+    which = kernels.drop_shared[kKinds](a->leaf_slots[leaf], b->leaf_slots[other], which, hits);
+    for (; which != 0; which &= which - 1) {
+      const std::int32_t i = std::countr_zero(which);
+      unsigned found = hits[i];
+      if (same && leaf == other) found &= ~0u << i;
+      for (; found != 0; found &= found - 1)
+        places.push_back({kLeaf * leaf + i, kLeaf * other + std::countr_zero(found)});
+    }
+  });
 }
 
-// Appends to `out` the ids (of a, of b) of all pairs that share no node, whose boxes are within `distance` (infinity
-// norm) and for which accept(slots of a, slots of b). Always in the same order.
-template <std::size_t A, std::size_t B, class Accept>
-void search(const std::vector<TreePair<A, B>>& trees, double distance, OrderedCollector& collector,
-            std::vector<Pair>& out, const Accept& accept) {
+// Appends to `out` the ids (of a, of b) of all pairs that share no node, whose boxes meet and that are left by
+// keep(trees, places), which takes pairs of places out of a list. Always in the same order.
+template <std::size_t A, std::size_t B, class Keep>
+void search(const std::vector<TreePair<A, B>>& trees, OrderedCollector& collector, std::vector<Pair>& out,
+            const Keep& keep) {
   struct Query {
     const TreePair<A, B>* trees;
     std::int32_t leaf;
   };
   std::vector<Query> queries;
   for (const auto& pair : trees)
-    if (!pair.a->tree.empty() && !pair.b->tree.empty() &&
-        overlap(pair.a->tree.bounds().grown(distance), pair.b->tree.bounds()))
-      for (const std::int32_t leaf : pair.a->tree.leaves()) queries.push_back({&pair, leaf});
-  collector.collect(static_cast<std::int64_t>(queries.size()), out, [&](std::int64_t k, std::vector<Pair>& found) {
-    const auto& [a, b] = *queries[k].trees;
-    const bool same = static_cast<const void*>(a) == static_cast<const void*>(b);
-    a->tree.near(queries[k].leaf, b->tree, same ? queries[k].leaf : 0, distance, [&](std::int32_t i, std::int32_t j) {
-      if (same && j <= i) return;  // each pair once: later places only
-      if (!share_a_node(a->slots[i], b->slots[j]) && accept(a->slots[i], b->slots[j]))
-        found.push_back({a->ids[i], b->ids[j]});
-    });
+    if (!pair.a->tree.empty() && !pair.b->tree.empty() && overlap(pair.a->tree.bounds(), pair.b->tree.bounds()))
+      for (std::int32_t leaf = 0; leaf < pair.a->tree.leaves(); ++leaf) queries.push_back({&pair, leaf});
+  const auto count = static_cast<std::int64_t>(queries.size());
+  collector.collect(count, out, [&](std::int64_t begin, std::int64_t end, std::vector<Pair>& found) {
+    constexpr std::size_t kEnough = 1024;  // for keep to work on
+    std::vector<Pair> places;
+    for (std::int64_t k = begin; k < end; ++k) {
+      const auto& pair = *queries[k].trees;
+      find_near(pair, queries[k].leaf, places);
+      if (places.size() < kEnough && k + 1 < end && queries[k + 1].trees == &pair) continue;
+      keep(pair, places);
+      for (const auto& [i, j] : places) found.push_back({pair.a->ids[i], pair.b->ids[j]});
+      places.clear();
+    }
   });
 }
 
