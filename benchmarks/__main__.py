@@ -1,4 +1,4 @@
-"""`python -m benchmarks [kernels|factor|step|ablation|variations|armadillo|rivals] ...`: prints Markdown tables."""
+"""`python -m benchmarks [NAME ...]`, the names below: prints Markdown tables."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import armadillo, kernels, step, variations
+from benchmarks import armadillo, contact, kernels, step, variations
 from benchmarks.rivals import runner
 
-NAMES = ("kernels", "factor", "step", "ablation", "variations", "armadillo", "rivals")
+ARMADILLO = Path("armadillo13K.msh")
+NAMES = ("kernels", "factor", "step", "ablation", "variations", "armadillo", "contact", "rivals")
 
 
 def main() -> None:
@@ -19,15 +20,25 @@ def main() -> None:
     options = _parser().parse_args()
     sizes = [int(size) for size in options.sizes.split(",")]
     threads = sorted({1, options.threads})
-    runs = {"steps": options.steps, "threads": options.threads, "repeats": options.repeats}
+    solvers = options.solvers.split(",") if options.solvers else []
+    runs = {"steps": options.steps or 40, "threads": options.threads, "repeats": options.repeats}
     rivals = runner.Settings(python=options.python, integrator=options.integrator, **runs)
     tables: dict[str, Callable[[], str]] = {
         "kernels": lambda: kernels.element_table(threads),
         "factor": lambda: kernels.factor_table(threads, [step.CELLS[size] for size in sizes]),
-        "step": lambda: step.table(sizes, options.solvers.split(","), variant=options.variant, **runs),
+        "step": lambda: step.table(sizes, solvers or step.CASES, variant=options.variant, **runs),
         "ablation": lambda: step.table(sizes, step.ABLATION, variant=options.variant, **runs),
         "variations": lambda: variations.table(**runs),
-        "armadillo": lambda: armadillo.table(options.mesh, options.solvers.split(","), **runs),
+        "armadillo": lambda: armadillo.table(options.mesh or ARMADILLO, solvers or step.CASES, **runs),
+        "contact": lambda: contact.table(
+            options.scenes.split(","),
+            solvers or contact.CASES,
+            tets=options.tets,
+            steps=options.steps,
+            mesh=options.mesh,
+            repeats=options.repeats,
+            limit=options.limit,
+        ),
         "rivals": lambda: runner.table(sizes, [name for name in options.only.split(",") if name], rivals),
     }
     for name in options.which or ["kernels", "factor", "step"]:
@@ -38,10 +49,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Benchmarks of qlb, as Markdown tables")
     parser.add_argument("which", nargs="*", choices=NAMES, help="default: kernels, factor, step")
     parser.add_argument("--sizes", default="1536,5184,12288", help=f"tets, out of {list(step.CELLS)}")
-    parser.add_argument("--solvers", default=",".join(step.CASES), help="NAME:KEY=VALUE, ... for step")
+    parser.add_argument("--solvers", default="", help="NAME:KEY=VALUE, ... for step, armadillo, contact")
     parser.add_argument("--variant", default="drop", choices=["drop", "twist"])
-    parser.add_argument("--mesh", type=Path, default=Path("armadillo13K.msh"), help="file of the armadillo")
-    parser.add_argument("--steps", type=int, default=40)
+    parser.add_argument("--mesh", type=Path, help=f"file of armadillo ({ARMADILLO}) or bunny (a shape)")
+    parser.add_argument("--steps", type=int, help="default: 40; with contact, what the scene asks for")
+    parser.add_argument("--scenes", default=",".join(contact.SCENES), help="contact: which scenes")
+    parser.add_argument("--tets", type=int, help="contact: about how many in each scene")
+    parser.add_argument(
+        "--limit", type=float, default=float("inf"), help="contact: CPU seconds after which a run stops"
+    )
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--only", default="", help="rivals: names of packages; default: all that are installed")
