@@ -57,10 +57,12 @@ void Lbfgs::take_terms(const RankOneTerms& terms, std::span<const double> known)
 double Lbfgs::direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
                              const RankOneTerms& terms, double* p, std::span<const double> known) {
   const std::int64_t count = terms.size();
-  for (std::int64_t j = 0; j < count; ++j)
-    if (terms.stiffness(j) < 0.0)
-      throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " +
-                                  std::to_string(terms.stiffness(j)) + ", expected at least 0");
+  for (std::int64_t j = 0; j < count; ++j) {
+    const double stiffness = known.empty() ? terms.stiffness(j) : known[j];
+    if (stiffness < 0.0)
+      throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " + std::to_string(stiffness) +
+                                  ", expected at least 0");
+  }
   take_terms(terms, known);
   beta_.assign(count, 0.0);
   std::ranges::copy(beta, beta_.begin());

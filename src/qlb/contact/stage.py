@@ -46,19 +46,23 @@ class ContactPoint:
     """the part of the gradient that is friction's, shape (n, 3)"""
 
     def terms(self) -> Terms:
-        """The Hessian along the normals, then that of friction, as a sum of k a a^T: nodes, a, k.
-
-        Friction has the stiffness mu lambda f1(u)/u across the sliding u, and at least a part of that along it, where
-        the Hessian has nothing once a contact slides: with all of it the quadratic would lie above its potential, with
-        nothing a step that turns u round goes too far.
-        """
-        c, f = self.contacts, self.friction
+        """The Hessian along the normals, then that of friction, as a sum of k a a^T."""
+        c = self.contacts
         normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
-        if f is None:
-            return normal
+        return normal if self.friction is None else joined(normal, self.sliding_terms())
+
+    def sliding_terms(self) -> Terms:
+        """The Hessian of friction, two terms a contact that was lagged.
+
+        Its stiffness is mu lambda f1(u)/u across the sliding u, and at least a part of that along it, where the Hessian
+        has nothing once a contact slides: with all of it the quadratic would lie above its potential, with nothing a
+        step that turns u round goes too far.
+        """
+        f = self.friction
+        assert f is not None
         stiffness = f.stiffness.copy()
         stiffness[::2] = np.maximum(f.stiffness[::2], ALONG * f.stiffness[1::2])
-        return joined(normal, (f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], stiffness))
+        return f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], stiffness
 
     @property
     def count(self) -> int:

@@ -9,8 +9,10 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint
+from qlb.contact.stage import ContactPoint, Terms, joined
 from qlb.integrators.integrator import Stage, State
+from qlb.solvers.contact_base import ContactBase
+from qlb.solvers.factor import Factor
 from qlb.solvers.line_search import Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
 from qlb.solvers.settings import Projection, SolverSettings, Tolerance
@@ -21,6 +23,7 @@ from qlb.timing import Timer
 MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
+CROWD = 400  # terms of contact from which on the factor takes them in
 
 
 class QLA(FactoredLbfgs):
@@ -32,7 +35,8 @@ class QLA(FactoredLbfgs):
 
     With contact the factor holds inertia and elasticity alone, in double precision: next to stiff contacts single is
     too little. All contacts enter by Woodbury's formula, with half-solves for their nodes that last as long as the
-    factor, and pairs hold the change of the gradient without contact, whose Hessian of the moment is known.
+    factor, and pairs hold the change of the gradient without contact, whose Hessian of the moment is known. Where there
+    are too many, a step makes a factor with all contacts of the moment in it, and goes on by differences.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
     cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
@@ -63,6 +67,17 @@ class QLA(FactoredLbfgs):
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
         self._solves = self._spent = 0  # solves with this factor, and their iterations
         self._stale = False
+        self._crowded: Factor | None = None  # the factor with contact in it, for many contacts
+        self._base: ContactBase | None = None  # what it holds; None where it is not in use
+
+    @property
+    def factorizations(self) -> int:
+        """Factorisations tried so far."""
+        return self.factor.count + (0 if self._crowded is None else self._crowded.count)
+
+    def begin_step(self) -> None:
+        """Forget a factor that holds contact: each step makes its own."""
+        self._base = None
 
     @property
     def inverse(self) -> _native.InverseOperator:
@@ -72,7 +87,9 @@ class QLA(FactoredLbfgs):
     @property
     def columns(self) -> int:
         """Nodes whose half-solves are kept for contact."""
-        return 0 if self._low_rank is None else self._low_rank.columns
+        if self._low_rank is None:
+            return 0
+        return self._low_rank.columns if self._base is None else self._crowded_inverse.columns
 
     def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Start the account of a solve."""
@@ -92,18 +109,75 @@ class QLA(FactoredLbfgs):
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H g, H from the pairs over the carried factor, which is made anew where contraction is too slow."""
-        if self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
-            self._refactor(problem, point, self.settings.projection)
+        slow = self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE
         if self._low_rank is None or point.contact is None:
+            if slow:
+                self._refactor(problem, point, self.settings.projection)
             return super().direction(problem, point)
+        if slow:
+            self._renew(problem, point, point.contact, self.settings.projection)
         with problem.timer.section("contact"):
-            terms, known, rest, forces = _split(problem, point, point.contact)
-            self._low_rank.set_terms(terms)
+            terms, known, inverse = self._terms(problem, point, point.contact)
+            rest, forces = _split(problem, point, point.contact, terms)
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
-            slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces, known)
+            slope = self.history.direction_with(rest, inverse, terms, p, -forces, known)
             self._p, self._known = p, _native.RankOneTerms(terms.nodes, terms.vectors, known)
             return p, slope
+
+    def _terms(
+        self, problem: StageProblem, point: Point, contact: ContactPoint
+    ) -> tuple[_native.RankOneTerms, FloatArray, _native.WoodburyInverse]:
+        """Terms of the Hessian of contact beside the factor, their stiffness in pairs, and the inverse with them.
+
+        Pairs hold the change of friction themselves, since its terms are a bound.
+        """
+        assert self._low_rank is not None
+        given = problem.contact_terms(point.x, contact)
+        known = given[2].copy()
+        known[contact.count : len(contact.terms()[2])] = 0.0
+        if self._base is None and len(known) <= CROWD:
+            terms = _native.RankOneTerms(*given)
+            self._low_rank.set_terms(terms)
+            return terms, known, self._low_rank
+        for _ in range(2):
+            if self._base is None:
+                self._take_in(problem, point, contact, self.settings.projection)
+            terms, removed = self._beside_base(problem, contact, given)
+            few = np.count_nonzero(terms.stiffness) <= CROWD
+            if few and self._crowded_inverse.set_terms(terms):
+                break
+            self._base = None
+        return terms, np.concatenate([known, np.zeros(removed)]), self._crowded_inverse
+
+    def _beside_base(
+        self, problem: StageProblem, contact: ContactPoint, given: Terms
+    ) -> tuple[_native.RankOneTerms, int]:
+        """Terms by which contact differs from what the factor holds; how many are what it has too many."""
+        assert self._base is not None
+        lacking, extra = self._base.difference(contact, given, problem.node_stiffness)
+        terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), extra))
+        return terms, len(extra[2])
+
+    def _take_in(self, problem: StageProblem, point: Point, contact: ContactPoint, projection: Projection) -> None:
+        """Factorise with all contacts of the moment."""
+        if self._crowded is None:
+            self._crowded = Factor(self.system, self.settings.cholesky, "float64")
+        if projection == "on-demand" and problem.system.is_inverted(point.x):
+            projection = "always"
+        self._crowded.update(problem, point.x, projection, contact.terms())
+        system = self.system
+        inverse = _native.WoodburyInverse(self._crowded.cholesky, system.blocks, system.held.fixed, system.threads)
+        self._crowded_inverse, self._base = inverse, ContactBase.of(contact)
+        self._mark(point)
+
+    def _renew(self, problem: StageProblem, point: Point, contact: ContactPoint, projection: Projection) -> None:
+        """A new factor here, of the kind in use."""
+        if self._base is None:
+            self._refactor(problem, point, projection)
+        else:
+            self.history.clear()
+            self._take_in(problem, point, contact, projection)
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
@@ -150,7 +224,10 @@ class QLA(FactoredLbfgs):
         if self._rescues == MAX_RESCUES:
             return False
         self._rescues += 1
-        self._refactor(problem, point, "always")
+        if point.contact is None:
+            self._refactor(problem, point, "always")
+        else:
+            self._renew(problem, point, point.contact, "always")
         return True
 
     def save(self) -> dict[str, FloatArray]:
@@ -211,23 +288,14 @@ class QLA(FactoredLbfgs):
 
 
 def _split(
-    problem: StageProblem, point: Point, contact: ContactPoint
-) -> tuple[_native.RankOneTerms, FloatArray, FloatArray, FloatArray]:
-    """Terms of the Hessian of contact, their stiffness in pairs, and the gradient as a rest minus forces along terms.
-
-    Beside stiff contacts the forces are kept apart from the rest: their sum would drown it in single precision. Pairs
-    hold the change of friction themselves, since its terms are an upper bound.
-    """
-    nodes, vectors, stiffness = problem.contact_terms(point.x, contact)
-    terms = _native.RankOneTerms(nodes, vectors, stiffness)
-    known = stiffness.copy()
-    if contact.friction is not None:
-        known[contact.count : contact.count + len(contact.friction.stiffness)] = 0.0
+    problem: StageProblem, point: Point, contact: ContactPoint, terms: _native.RankOneTerms
+) -> tuple[FloatArray, FloatArray]:
+    """The gradient as a rest (n, 3) minus forces (t,) along terms: beside stiff contacts their sum would drown it."""
     forces = np.zeros(terms.size)
     forces[: contact.count] = contact.contacts.force
     rest = point.gradient.copy()
     terms.add_combination(forces, rest)
-    return terms, known, problem.system.clear_held(rest), forces
+    return problem.system.clear_held(rest), forces
 
 
 def _secant_gradient(point: Point) -> FloatArray:

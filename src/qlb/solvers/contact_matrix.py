@@ -6,7 +6,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, IntArray
-from qlb.contact.stage import ContactPoint
+from qlb.contact.stage import ContactPoint, Terms
 from qlb.system import System
 from qlb.system.system import CholeskyKind, Precision
 
@@ -35,24 +35,31 @@ class ContactMatrix:
         self._matrix = _native.BlockMatrix(system.pattern)
         self._scripted = (system.held.fixed != 0).all(axis=1)
 
-    def assemble(self, elastic: _native.BlockMatrix, contact: ContactPoint, x: FloatArray) -> _native.BlockMatrix:
-        """`elastic` plus the projected Hessian of `contact` at `x` (n, 3) [m]; belongs to this object.
+    def assemble(
+        self, elastic: _native.BlockMatrix, contact: ContactPoint | Terms, x: FloatArray
+    ) -> _native.BlockMatrix:
+        """`elastic` plus the projected Hessian of `contact` at `x` (n, 3) [m], or given terms; belongs to this object.
 
         `cholesky` is another one afterwards where the pattern had to be extended.
         """
-        model = self._system.contact
-        assert model is not None
-        blocks = model.barrier.hessian_blocks(x, contact.contacts, True)
-        parts = [self._onto_free(contact.contacts.nodes, blocks)]
-        if contact.friction is not None:  # of contacts that were, which need not be contacts now
-            parts.append(self._onto_free(contact.friction.nodes, _blocks(contact.friction)))
-        nodes = np.concatenate([nodes for nodes, _ in parts])
+        nodes, blocks = self._onto_free(*self._stencil_blocks(contact, x))
         if not self._holds(nodes).all():
             self._extend(nodes)
         self._matrix.set_from(self._map, elastic)
-        for stencils, hessians in parts:
-            self._matrix.add_stencils(stencils, hessians)
+        self._matrix.add_stencils(nodes, blocks)
         return self._matrix
+
+    def _stencil_blocks(self, contact: ContactPoint | Terms, x: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Stencils (k, 4) and their blocks (k, 12, 12)."""
+        if isinstance(contact, tuple):
+            return contact[0], _blocks(contact[1], contact[2])
+        model = self._system.contact
+        assert model is not None
+        nodes, blocks = contact.contacts.nodes, model.barrier.hessian_blocks(x, contact.contacts, True)
+        if contact.friction is None:  # else of contacts that were, which need not be contacts now
+            return nodes, blocks
+        sliding_nodes, *sliding = contact.sliding_terms()
+        return np.concatenate([nodes, sliding_nodes]), np.concatenate([blocks, _blocks(*sliding)])
 
     def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
         """Stencils in which nodes that are wholly scripted give way to another of the stencil, with nothing in it."""
@@ -94,10 +101,10 @@ class ContactMatrix:
         self._matrix = _native.BlockMatrix(self._pattern)
 
 
-def _blocks(terms: _native.FrictionTerms) -> FloatArray:
-    """stiffness a a^T of each term, shape (k, 12, 12)."""
-    a = (terms.gamma[:, :, None] * terms.axis[:, None, :]).reshape(-1, 12)
-    return np.asarray(terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
+def _blocks(vectors: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """stiffness a a^T of each term, a of shape (k, 4, 3); shape (k, 12, 12)."""
+    a = vectors.reshape(-1, 12)
+    return np.asarray(stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
 
 
 def _keys(pattern: _native.BlockPattern) -> np.ndarray:

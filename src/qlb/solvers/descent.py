@@ -181,6 +181,11 @@ class Descent(ABC):
                 return Reason.LINE_SEARCH_FAILED
 
     @property
+    def factorizations(self) -> int:
+        """Factorisations tried so far."""
+        return self.factor.count
+
+    @property
     def columns(self) -> int:
         """Nodes whose columns a low-rank part of the factor holds."""
         return 0
@@ -234,11 +239,11 @@ class _Log:
     def __init__(self, problem: StageProblem, solver: Descent) -> None:
         self.rows: list[IterationRow] = []
         self.point: Point
-        self._problem, self._solver, self._tried = problem, solver, solver.factor.count
+        self._problem, self._solver, self._tried = problem, solver, solver.factorizations
 
     def add(self, point: Point, step_length: float, longest: float = 1.0) -> None:
         solver, contact = self._solver, self._problem.contact
-        made, self._tried = solver.factor.count - self._tried, solver.factor.count
+        made, self._tried = solver.factorizations - self._tried, solver.factorizations
         seconds = self._problem.timer.lap()
         row = IterationRow(len(self.rows), point.residual, point.energy, step_length, made, seconds)
         if contact is not None and point.contact is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint
+from qlb.contact.stage import ContactPoint, Terms
 from qlb.errors import InputError
 from qlb.solvers.contact_matrix import ContactMatrix
 from qlb.solvers.settings import Projection
@@ -39,7 +39,7 @@ class Factor:
         """Whether the factor in place is of the projected Hessian."""
 
     def update(
-        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None = None
+        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | Terms | None = None
     ) -> None:
         """Factorise the Hessian at `x`, with that of `contact` there where it is given.
 
@@ -66,7 +66,9 @@ class Factor:
                 return
         raise HessianNotFinite("the Hessian has entries that are not finite")
 
-    def _try(self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | None) -> bool:
+    def _try(
+        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | Terms | None
+    ) -> bool:
         """The Hessians at `x` that `projection` allows, one after the other."""
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
             problem.hessian(x, project=project, matrix=self._matrix)
@@ -80,7 +82,7 @@ class Factor:
         self.cholesky.set_precision("float64")
         self.raised = True
 
-    def _factorise(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | None) -> bool:
+    def _factorise(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | Terms | None) -> bool:
         matrix = self._matrix
         if contact is not None:
             matrix = self._add_contact(problem, x, contact)
@@ -88,7 +90,7 @@ class Factor:
             self.count += 1
             return self.cholesky.factorise(matrix) < 0
 
-    def _add_contact(self, problem: StageProblem, x: FloatArray, contact: ContactPoint) -> _native.BlockMatrix:
+    def _add_contact(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | Terms) -> _native.BlockMatrix:
         with problem.timer.section("contact"):
             matrix = self._contact_matrix().assemble(self._matrix, contact, x)
             self.cholesky = self._contact_matrix().cholesky

@@ -172,12 +172,12 @@ class StageProblem:
         How normals turn is in it where that counts beside the stiffness of the bodies: where forces are large.
         """
         assert self.system.contact is not None
-        bending = self.system.contact.barrier.bending(x, contact.contacts, BENDING * self._node_stiffness)
+        bending = self.system.contact.barrier.bending(x, contact.contacts, BENDING * self.node_stiffness)
         vectors = bending.vectors.reshape(-1, 4, 3)
         return joined(contact.terms(), (bending.nodes, vectors, bending.stiffness))
 
     @cached_property
-    def _node_stiffness(self) -> float:
+    def node_stiffness(self) -> float:
         """About the mean diagonal entry of the Hessian without contact."""
         system = self.system
         return float(np.mean(self._mass_scale * system.mass + 10 * self.force_scale * system.spring))
