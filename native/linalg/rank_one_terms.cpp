@@ -33,7 +33,9 @@ void RankOneTerms::take(std::span<const std::int32_t> nodes, std::span<const dou
   for (std::size_t j = 0; j < count; ++j) {
     std::copy_n(nodes.begin() + 4 * j, 4, nodes_[j].begin());
     for (const std::int32_t node : nodes_[j]) {
-      if (node < 0) throw std::invalid_argument("a term has node " + std::to_string(node) + ", which is negative");
+      if (node < 0)
+        throw std::invalid_argument("term " + std::to_string(j) + " has node " + std::to_string(node) +
+                                    ", expected at least 0");
       last_node_ = std::max(last_node_, node);
     }
   }

@@ -126,6 +126,7 @@ def test_an_obstacle_far_away_changes_nothing(solver, integrator, mass):
             mass=mass,
             gravity=lambda t: np.array([0, -5 * t, 0]),
             obstacles=obstacles,
+            contact=False,
             threads=1,
         )
         states.append(finish(pinned(simulation), 4))

@@ -169,8 +169,7 @@ class Descent(ABC):
         while True:
             p, slope = self.direction(problem, point)
             if np.isfinite(slope) and slope < 0:
-                contact = problem.contact
-                small = contact is not None and _reach(p) <= self.tolerance.step * contact.model.dhat
+                small = self._is_small(problem, point, p)
                 longest = _longest_step(problem, point.x, p)
                 found = backtrack(problem, point, p, slope, longest)
                 if found is not None:
@@ -179,6 +178,12 @@ class Descent(ABC):
                     return Reason.CONVERGED_STEP
             if not self.recover(problem, point):
                 return Reason.LINE_SEARCH_FAILED
+
+    def _is_small(self, problem: StageProblem, point: Point, p: FloatArray) -> bool:
+        """Whether something touches, and a direction p (n, 3) [m] is so short beside dhat that it may end the solve."""
+        if problem.contact is None or point.contact is None or point.contact.count == 0:
+            return False
+        return _reach(p) <= self.tolerance.step * problem.contact.model.dhat
 
     @property
     def factorizations(self) -> int:
