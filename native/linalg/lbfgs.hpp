@@ -25,8 +25,8 @@ class Lbfgs {
   // The same for g + C beta, with y + C K C^T s in place of each y, for terms that do not take away (structured
   // quasi-Newton: what the pairs hold is the change of the gradient without these terms, and their Hessian of the
   // moment is known). Vectors in the span of C are kept apart by their coefficients all the way: next to stiff terms
-  // the solves of a float32 factor would leave nothing of the rest. beta: one per term, or none. known: stiffness of the
-  // terms in the pairs, zero for what the pairs hold themselves; that of the terms if empty.
+  // the solves of a float32 factor would leave nothing of the rest. beta: one per term, or none. known: stiffness of
+  // the terms in the pairs, zero for what the pairs hold themselves; that of the terms if empty.
   double direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
                         const RankOneTerms& terms, double* p, std::span<const double> known = {});
 

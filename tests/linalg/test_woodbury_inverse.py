@@ -355,25 +355,6 @@ def test_product_with_terms_is_that_of_the_dense_matrix(rng: np.random.Generator
     np.testing.assert_allclose(out.ravel(), expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
-def test_forces_kept_apart_give_the_same_solution(rng: np.random.Generator, precision: str) -> None:
-    body = Body(precision)
-    body.carry()
-    terms = body.terms(30, np.where(np.arange(30) < 3, 0.0, 10.0 ** rng.uniform(-3, 3, size=30))).native
-    assert body.inverse.set_terms(terms)
-    history = _native.Lbfgs(3 * body.count, 4, 1)
-    g, beta = rng.normal(size=(body.count, 3)) * (body.fixed == 0), rng.normal(size=30)
-    whole = g.copy()
-    terms.add_combination(beta, whole)
-    whole *= body.fixed == 0
-    p, q = np.empty_like(g), np.empty_like(g)
-    slope = history.direction_with(whole, body.inverse, terms, p)
-    apart = history.direction_with(g, body.inverse, terms, q, beta)
-    accuracy = 2e-4 if precision == "float32" else 1e-10
-    np.testing.assert_allclose(q, p, rtol=0, atol=accuracy * np.abs(p).max())
-    assert apart == pytest.approx(slope, rel=accuracy)
-
-
 def broken(name: str, value: object) -> Callable[[Terms], Terms]:
     def change(terms: Terms) -> Terms:
         part = getattr(terms, name).copy()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from qlb.solvers.line_search import Point, backtrack
+from qlb.system.stage_problem import Evaluation
 from tests.support import Array
 
 
@@ -16,8 +17,9 @@ class Curve:
     def __init__(self, value: Callable[[float], float], derivative: Callable[[float], float]) -> None:
         self.value, self.derivative, self.energy_rounding = value, derivative, 0.0
 
-    def value_gradient(self, x: Array) -> tuple[float, Array]:
-        return self.value(float(x[0])), np.array([self.derivative(float(x[0]))])
+    def evaluate(self, x: Array) -> Evaluation:
+        gradient = np.array([self.derivative(float(x[0]))])
+        return Evaluation(self.value(float(x[0])), gradient, gradient, None)
 
     def residual(self, gradient: Array) -> float:
         return abs(float(gradient[0]))

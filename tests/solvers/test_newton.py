@@ -114,7 +114,7 @@ def test_an_accepted_step_goes_back_to_the_exact_hessian() -> None:
     point = Point.at(problem, problem.start)
     solver.direction(problem, point)
     solver.recover(problem, point)
-    solver.accept(point, point)
+    solver.accept(problem, point, point, limited=False)
     solver.direction(problem, point)
     assert not solver.factor.projected
 

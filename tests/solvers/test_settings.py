@@ -18,7 +18,7 @@ from qlb.solvers import SOLVERS
         (Tolerance, {"absolute": float("inf")}, "absolute: inf is out of range: must be >= 0"),
         (Tolerance, {"scaled": "small"}, "scaled: 'small' is not a number"),
         (Tolerance, {"relativ": 1e-6}, "unknown key 'relativ'; did you mean 'relative'?"),
-        (Tolerance, {"qqq": 1}, "unknown key 'qqq'; valid keys: relative, absolute, scaled"),
+        (Tolerance, {"qqq": 1}, "unknown key 'qqq'; valid keys: relative, absolute, scaled, step"),
         (SolverSettings, {"window": 0}, "window: 0 is out of range: must be a whole number >= 1 and <= 100"),
         (SolverSettings, {"window": 2.5}, "window: 2.5 is out of range: must be a whole number >= 1 and <= 100"),
         (SolverSettings, {"window": True}, "window: True is not a number"),

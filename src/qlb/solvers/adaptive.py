@@ -23,7 +23,7 @@ from qlb.timing import Timer
 MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
-CROWD = 400  # terms of contact from which on the factor takes them in
+CROWD = 600  # terms of contact from which on the factor takes them in
 
 
 class QLA(FactoredLbfgs):
