@@ -26,7 +26,7 @@ class Tolerance(Settings):
     )
     step: float = quantity(
         1e-2,
-        "Where something touches: |p|_inf of the search direction relative to contact.dhat; 0 turns it off, so that only"
+        "Where something touches: |p|_inf of the search direction relative to contact.dhat; 0 turns it off, then only"
         " |g| counts",
         ge=0,
     )
