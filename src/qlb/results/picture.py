@@ -59,7 +59,7 @@ def render_frames(
     """Render chosen frames side by side into one PNG, all from the same camera.
 
     The surface is coloured by the distance of each node from its place at rest, or where there are several bodies by
-    the body; the rest shape is drawn faintly. Obstacles and planes are grey.
+    the body. Obstacles and planes are grey; without any the rest shape is drawn faintly.
 
     Args:
         run: the run.
@@ -205,7 +205,8 @@ def _render(pyvista: ModuleType, surface: _Surface, scenery: Scenery, camera: _C
     try:
         plotter.set_background("white")
         _aim(plotter, camera, height / grid.scale)
-        _add_rest(plotter, pyvista, surface)
+        if scenery.is_empty:
+            _add_rest(plotter, pyvista, surface)
         images = []
         for frame, x in enumerate(surface.deformed):
             scenery.show(plotter, pyvista, frame, surface.everywhere, camera.direction)

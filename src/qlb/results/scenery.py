@@ -43,6 +43,11 @@ class Scenery:
             [frame.plane_points for frame in frames],
         )
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing but the bodies."""
+        return len(self.triangles) == 0 and len(self.normals) == 0
+
     def around(self, bodies: FloatArray) -> FloatArray:
         """The vertices that lie near points of the bodies (k, 3): others would make the bodies too small to see."""
         low, high = bodies.min(axis=0), bodies.max(axis=0)
