@@ -129,7 +129,8 @@ def test_a_bar_twisted_two_turns_into_itself():
 
 
 @pytest.mark.slow
-def test_ten_boxes_heavy_above_light():
+@pytest.mark.parametrize("solver", ["ND", "QLA"])
+def test_ten_boxes_heavy_above_light(solver):
     """Densities from 100 below to 10000 above."""
     bodies = [
         block(
@@ -141,7 +142,7 @@ def test_ten_boxes_heavy_above_light():
         )
         for k, density in enumerate(np.geomspace(100, 10000, 10))
     ]
-    simulation = simulate(bodies, Plane((0, 0, 0), UP), contact=Contact(friction=0.3))
+    simulation = simulate(bodies, Plane((0, 0, 0), UP), solver=solver, contact=Contact(friction=0.3))
     for _ in checked(simulation, 40):
         pass
     tops = [simulation.state.positions[simulation.nodes_of(k), 1].mean() for k in range(10)]
@@ -162,13 +163,15 @@ def funnel(top: float, bottom: float, height: float, wall: float = 0.02, sides: 
 
 
 @pytest.mark.slow
-def test_a_ball_through_a_tight_moving_funnel():
+@pytest.mark.parametrize("solver", ["ND", "QLA"])
+def test_a_ball_through_a_tight_moving_funnel(solver):
     """A neck of three quarters of the ball comes over it from below, while a rod above holds the ball back."""
     ball = Body(shapes.ball(0.1, tets=1500), SOFT, name="ball")
     x, triangles = funnel(0.16, 0.075, 0.2)
     tube = Obstacle(x - [0, 0.25, 0], triangles, motion=Translation((0, 0.5, 0)), name="funnel")
     rod = Obstacle(*box_surface((0.04, 0.5, 0.04), (0, 0.36, 0)), name="rod")
-    simulation = simulate(ball, tube, rod, gravity=(0, 0, 0), contact=Contact(dhat=2e-3, friction=0.1), step=0.01)
+    touching = Contact(dhat=2e-3, friction=0.1)
+    simulation = simulate(ball, tube, rod, solver=solver, gravity=(0, 0, 0), contact=touching, step=0.01)
     for _ in checked(simulation, 60):
         pass
     ball_y, tube_y = (simulation.state.positions[simulation.nodes_of(k), 1] for k in ("ball", "funnel"))

@@ -138,17 +138,28 @@ class QLA(FactoredLbfgs):
         known[contact.count : len(contact.terms()[2])] = 0.0
         if self._base is None and len(known) <= CROWD:
             terms = _native.RankOneTerms(*given)
-            self._low_rank.set_terms(terms)
-            return terms, known, self._low_rank
-        for _ in range(2):
-            if self._base is None:
-                self._take_in(problem, point, contact, self.settings.projection)
-            terms, removed = self._beside_base(problem, contact, given)
-            few = np.count_nonzero(terms.stiffness) <= CROWD
-            if few and self._crowded_inverse.set_terms(terms):
-                break
-            self._base = None
+            if self._low_rank.set_terms(terms):
+                return terms, known, self._low_rank
+        terms, removed = self._crowd_terms(problem, point, contact, given)
         return terms, np.concatenate([known, np.zeros(removed)]), self._crowded_inverse
+
+    def _crowd_terms(
+        self, problem: StageProblem, point: Point, contact: ContactPoint, given: Terms
+    ) -> tuple[_native.RankOneTerms, int]:
+        """Terms beside the factor with contact, which is made anew where they are many or their sum is not definite.
+
+        Should that not help, the factor alone has to do.
+        """
+        if self._base is not None:
+            terms, removed = self._beside_base(problem, contact, given)
+            if np.count_nonzero(terms.stiffness) <= CROWD and self._crowded_inverse.set_terms(terms):
+                return terms, removed
+        self._take_in(problem, point, contact, self.settings.projection)
+        terms, removed = self._beside_base(problem, contact, given)
+        if not self._crowded_inverse.set_terms(terms):
+            terms = _native.RankOneTerms(terms.nodes, terms.vectors, np.zeros(terms.size))
+            self._crowded_inverse.set_terms(terms)
+        return terms, removed
 
     def _beside_base(
         self, problem: StageProblem, contact: ContactPoint, given: Terms
