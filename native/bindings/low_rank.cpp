@@ -1,16 +1,11 @@
 #include "bindings/bindings.hpp"
+#include "bindings/rows.hpp"
 
 #include "linalg/rank_one_terms.hpp"
 #include "linalg/woodbury_inverse.hpp"
 
 namespace qlb {
 namespace {
-
-template <class T, std::size_t width>
-auto rows(const std::vector<std::array<T, width>>& values) {
-  return nb::ndarray<nb::numpy, const T, nb::shape<-1, width>>(values.empty() ? nullptr : values[0].data(),
-                                                               {values.size(), width});
-}
 
 void bind_terms(nb::module_& m) {
   constexpr auto inside = nb::rv_policy::reference_internal;

@@ -55,3 +55,16 @@ def test_a_run_cut_in_two_in_the_middle_of_contact_gives_the_same_bits(solver):
     second = resumed(first, two_cubes(solver))
     finish(second, STEPS - 5)
     assert_same_bits(second.state, whole.state)
+
+
+@pytest.mark.parametrize("crowd", [3, 12])
+def test_so_does_one_with_contacts_in_its_factor(crowd, monkeypatch):
+    """From `crowd` terms on QLA takes contacts into a factor, whose pattern grows with the pairs that touched."""
+    monkeypatch.setattr("qlb.solvers.adaptive.CROWD", crowd)
+    whole, first = two_cubes("QLA"), two_cubes("QLA")
+    finish(whole, STEPS)
+    finish(first, 6)
+    assert any(name.startswith("crowded_") for name in first.solver.save())
+    second = resumed(first, two_cubes("QLA"))
+    finish(second, STEPS - 6)
+    assert_same_bits(second.state, whole.state)

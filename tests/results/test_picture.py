@@ -12,15 +12,6 @@ import qlb
 from qlb.results import MissingExtra, RenderingFailed, picture, render_frames
 
 
-@pytest.fixture
-def can_render() -> None:
-    pytest.importorskip("pyvista")
-    try:
-        picture._window_class()
-    except RenderingFailed as error:
-        pytest.skip(str(error))
-
-
 @pytest.mark.usefixtures("can_render")
 def test_a_picture_shows_the_body_in_colour(make_run, tmp_path):
     run = make_run(step=0.1)

@@ -9,8 +9,7 @@ import pytest
 from PIL import Image
 
 import qlb
-from qlb.results import Run, RunWriter, finish_run, picture, render_frames
-from qlb.results.errors import RenderingFailed
+from qlb.results import Run, RunWriter, finish_run, render_frames
 from qlb.results.parts import Parts
 from qlb.results.scenery import Scenery
 
@@ -118,15 +117,6 @@ def test_far_vertices_do_not_count_for_the_view():
     vertices = np.array([[-1.4, 3.4, 2.4], [-1.6, 0, 0], [0, 99, 0], [3.4, -1.4, -1.4]])
     scenery = Scenery(np.empty((0, 3), np.int32), [vertices], np.empty((0, 3)), [np.empty((0, 3))])
     np.testing.assert_array_equal(scenery.around(bodies), vertices[[0, 3]])
-
-
-@pytest.fixture
-def can_render() -> None:
-    pytest.importorskip("pyvista")
-    try:
-        picture._window_class()
-    except RenderingFailed as error:
-        pytest.skip(str(error))
 
 
 @pytest.mark.usefixtures("can_render")

@@ -242,19 +242,25 @@ class QLA(FactoredLbfgs):
         return True
 
     def save(self) -> dict[str, FloatArray]:
-        """What the factor was made of, and the account of its use."""
+        """What the factor was made of, and the account of its use; for which pairs that with contact was analysed."""
+        crowded = {} if self._crowded is None else {f"crowded_{k}": v for k, v in self._crowded.save().items()}
         if self._reference is None or self._kind is None:
-            return {}
+            return crowded
         factor = self.factor
         flags = (self._stale, factor.projected, factor.raised)
         account = np.array([*self._kind, self._solves, self._spent, *flags], dtype=np.float64)
-        saved = {"reference": self._reference, "account": account}
+        saved = crowded | {"reference": self._reference, "account": account}
         if factor.shifted or not self.system.hessian_is_of_positions:
             saved["matrix"] = factor.matrix_values()  # many times larger; else it follows from the reference
         return saved
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take it back, and factorise again."""
+        crowded = {k.removeprefix("crowded_"): v for k, v in arrays.items() if k.startswith("crowded_")}
+        self._crowded = self._base = None
+        if crowded:
+            self._crowded = Factor(self.system, self.settings.cholesky, "float64")
+            self._crowded.load(crowded)
         self._reference = arrays.get("reference")
         if self._reference is None:
             return
