@@ -55,7 +55,8 @@ class Placement:
         if self.scale != 1 or any(self.rotation):
             origin = centre_of_volume(mesh) if self.origin is None else np.asarray(self.origin)
             x = origin + self.scale * (x - origin) @ _matrix(self.rotation).T
-        return TetMesh(x + np.asarray(self.translation), mesh.tets, regions=mesh.regions)
+        placed = TetMesh(x + np.asarray(self.translation), mesh.tets, regions=mesh.regions)
+        return placed.with_surface(mesh.surface)
 
 
 @dataclass(frozen=True, eq=False)

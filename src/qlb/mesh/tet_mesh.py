@@ -13,6 +13,7 @@ import numpy.typing as npt
 from qlb.arrays import BoolArray, FloatArray, IntArray, LongArray
 from qlb.errors import InputError
 from qlb.mesh.box import kuhn_box
+from qlb.mesh.embedded_surface import EmbeddedSurface
 from qlb.mesh.files import read_tets
 from qlb.mesh.geometry import signed_volumes
 
@@ -28,6 +29,7 @@ class TetMesh:
         tets: node indices, shape (m, 4), int32, positively oriented: det(x1 - x0, x2 - x0, x3 - x0) > 0.
         regions: id of the region of each tet, shape (m,), int64, for parameters that differ from region to region; or
             None.
+        surface: what pictures and exports show of it, or None for its boundary (`rendered`).
 
     Raises:
         InputError: a NaN position, an index out of range, a tet that names a node twice, is flat or inverted, a node
@@ -46,6 +48,7 @@ class TetMesh:
         self.positions: FloatArray = x
         self.tets: IntArray = t.astype(np.int32, order="C")
         self.regions: LongArray | None = None if regions is None else _regions(regions, len(t))
+        self.surface: EmbeddedSurface | None = None
         _check_geometry(self)
         self.positions.setflags(write=False)
         self.tets.setflags(write=False)
@@ -74,18 +77,34 @@ class TetMesh:
     def union(meshes: Sequence[TetMesh]) -> TetMesh:
         """Nodes and tets of one mesh after the other; the mesh itself where there is one.
 
-        It has regions where all have them.
+        It has regions where all have them, and a surface where one has it.
         """
         if len(meshes) == 1:
             return meshes[0]
         begin = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
         tets = np.concatenate([mesh.tets.astype(np.int64) + k for mesh, k in zip(meshes, begin, strict=True)])
         regions = [mesh.regions for mesh in meshes if mesh.regions is not None]
-        return TetMesh(
+        union = TetMesh(
             np.concatenate([mesh.positions for mesh in meshes]),
             tets,
             regions=np.concatenate(regions) if len(regions) == len(meshes) else None,
         )
+        if any(mesh.surface is not None for mesh in meshes):
+            first_tets = np.cumsum([0, *(len(mesh.tets) for mesh in meshes)])[:-1]
+            union.surface = EmbeddedSurface.union([mesh.rendered() for mesh in meshes], first_tets, union)
+        return union
+
+    def with_surface(self, surface: EmbeddedSurface | None) -> TetMesh:
+        """The same mesh, shown as `surface`; self where it is already."""
+        if surface is self.surface:
+            return self
+        mesh = copy(self)
+        mesh.surface = surface
+        return mesh
+
+    def rendered(self) -> EmbeddedSurface:
+        """What is shown of it: its surface where it has one, else its boundary."""
+        return EmbeddedSurface.of_boundary(self) if self.surface is None else self.surface
 
     def with_loose_nodes(self, positions: FloatArray) -> TetMesh:
         """The same tets, and behind their nodes others that belong to none: `positions` (q, 3) [m]; self for q = 0."""

@@ -6,7 +6,9 @@ Format version 1::
     scene.yaml          the resolved scene
     mesh.npz            positions [m] (n, 3) at rest, tets (m, 4) of all bodies; where there are several, or obstacles:
                         groups (n + q,), body_names; obstacle_names, obstacle_vertices [m] (q, 3) at rest,
-                        obstacle_triangles (t, 3); planes (p, 6), a point [m] and the normal of each
+                        obstacle_triangles (t, 3); where bodies are shown by surfaces of their own, surface_triangles,
+                        surface_tets, surface_weights (`EmbeddedSurface`); planes (p, 6), a point [m] and the normal
+                        of each
     frames/000000.npz   step, time [s], positions [m] (n + q, 3), velocities [m/s] (n + q, 3), those of obstacles last;
                         plane_points [m] (p, 3) where there are planes; with contact, but for the first frame of a
                         run, contact_forces on each node [N] (n + q, 3) and the total on each plane, plane_forces [N]

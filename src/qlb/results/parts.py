@@ -10,7 +10,7 @@ import numpy as np
 from qlb.arrays import FloatArray, IntArray
 from qlb.bodies import Assembly
 from qlb.errors import InputError
-from qlb.mesh import TetMesh
+from qlb.mesh import EmbeddedSurface, TetMesh
 from qlb.results.files import Arrays, read_arrays
 
 
@@ -60,6 +60,9 @@ class Parts:
         arrays: Arrays = {"positions": self.mesh.positions, "tets": self.mesh.tets}
         if self.nodes > len(self.mesh.positions) or self.bodies > 1:
             arrays |= {"groups": self.groups, "body_names": np.array(self.body_names, np.str_)}
+        if (surface := self.mesh.surface) is not None:
+            arrays |= {"surface_triangles": surface.triangles}
+            arrays |= {"surface_tets": surface.tets, "surface_weights": surface.weights}
         if len(self.obstacle_triangles):
             arrays |= {"obstacle_names": np.array(self.obstacle_names, np.str_)}
             arrays |= {"obstacle_vertices": self.obstacle_vertices, "obstacle_triangles": self.obstacle_triangles}
@@ -77,7 +80,12 @@ class Parts:
         if len(vertices):
             shapes |= {"obstacle_names": (None,), "obstacle_vertices": (None, 3), "obstacle_triangles": (None, 3)}
         shapes |= {"planes": (None, 6)} if "planes" in arrays else {}
+        if "surface_triangles" in arrays:
+            shapes |= {"surface_triangles": (None, 3), "surface_tets": (None,), "surface_weights": (None, 4)}
         arrays = read_arrays(path, shapes)
+        if "surface_triangles" in arrays:
+            triangles, tets = (arrays[name].astype(np.int64) for name in ("surface_triangles", "surface_tets"))
+            mesh = mesh.with_surface(EmbeddedSurface.on(mesh, triangles, tets, arrays["surface_weights"]))
         triangles = arrays.get("obstacle_triangles", np.empty((0, 3))).astype(np.int32)
         if len(triangles) and (triangles.min() < len(mesh.positions) or triangles.max() >= nodes):
             raise InputError(f"{path} is not what it should be: 'obstacle_triangles' name nodes that are no obstacle's")
