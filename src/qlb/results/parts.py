@@ -84,8 +84,8 @@ class Parts:
             shapes |= {"surface_triangles": (None, 3), "surface_tets": (None,), "surface_weights": (None, 4)}
         arrays = read_arrays(path, shapes)
         if "surface_triangles" in arrays:
-            triangles, tets = (arrays[name].astype(np.int64) for name in ("surface_triangles", "surface_tets"))
-            mesh = mesh.with_surface(EmbeddedSurface.on(mesh, triangles, tets, arrays["surface_weights"]))
+            faces, owners = (arrays[name].astype(np.int64) for name in ("surface_triangles", "surface_tets"))
+            mesh = mesh.with_surface(EmbeddedSurface.on(mesh, faces, owners, arrays["surface_weights"]))
         triangles = arrays.get("obstacle_triangles", np.empty((0, 3))).astype(np.int32)
         if len(triangles) and (triangles.min() < len(mesh.positions) or triangles.max() >= nodes):
             raise InputError(f"{path} is not what it should be: 'obstacle_triangles' name nodes that are no obstacle's")
