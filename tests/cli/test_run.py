@@ -225,6 +225,12 @@ def test_interrupt_keeps_what_is_done(tmp_path, name):
     assert "kept" in err
     assert summary["status"] == "interrupted"
     assert 4 <= summary["steps"] == len(list(Path(frames).glob("*.npz"))) - 1
+    done = summary["steps"]
+    resumed = [*command, "resume", "out", "--steps", str(done + 2), "--no-picture"]
+    again = subprocess.run(resumed, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert f"{done + 2} steps" in again.stdout
+    assert len(list(Path(frames).glob("*.npz"))) == done + 3
 
 
 def test_a_run_with_contact_shows_it(qlb, tmp_path):

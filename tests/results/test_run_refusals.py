@@ -129,7 +129,7 @@ def test_damaged_files_are_named(make_run):
     directory = make_run(steps=2).directory
     damage = {
         "frames/000001.npz": lambda run: run.frame(1),
-        "checkpoint.npz": lambda run: run.load_checkpoint(),
+        "checkpoint.npz": lambda run: run.checkpoint,
         "mesh.npz": lambda run: run.mesh,
         "stats.csv": lambda run: run.stats,
         "summary.json": lambda run: run.summary,
@@ -160,7 +160,7 @@ def test_a_flipped_byte_is_found(make_run):
     data[len(data) // 2] ^= 0x01
     path.write_bytes(data)
     with pytest.raises(qlb.InputError, match=r"checkpoint\.npz is damaged"):
-        run.load_checkpoint()
+        _ = run.checkpoint
 
 
 def test_a_checkpoint_of_another_mesh_is_refused(make_run, make_simulation, tmp_path):
@@ -170,7 +170,7 @@ def test_a_checkpoint_of_another_mesh_is_refused(make_run, make_simulation, tmp_
     run = make_run(steps=1)
     (tmp_path / "other" / "checkpoint.npz").replace(run.directory / "checkpoint.npz")
     with pytest.raises(qlb.InputError, match=r"'positions' has shape \(8, 3\), must be \(20, 3\)"):
-        run.load_checkpoint()
+        _ = run.checkpoint
 
 
 def test_a_missing_frame_is_named(make_run):

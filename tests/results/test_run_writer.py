@@ -124,7 +124,7 @@ def test_the_writers_own_time_is_not_counted(tmp_path, make_simulation, monkeypa
 def test_stride_keeps_the_last_step(make_run):
     run = make_run(steps=5, stride=3)
     assert run.frame_steps == [0, 3, 5]
-    assert run.load_checkpoint()[1] == 5
+    assert run.checkpoint.steps_done == 5
     assert list(run.iterations_per_step().steps) == [1, 2, 3, 4, 5]
 
 
@@ -136,7 +136,7 @@ def test_a_checkpoint_goes_on_to_the_same_bits(tmp_path, make_simulation, integr
     simulation = make_simulation(**settings)
     _run(RunWriter(tmp_path / "run", {}, simulation), simulation.run(3))
     resumed = make_simulation(**settings)
-    resumed.restore(*Run(tmp_path / "run").load_checkpoint())
+    Run(tmp_path / "run").restore(resumed)
     for expected, result in zip(unbroken[3:], resumed.run(3), strict=True):
         assert (result.step, result.time) == (expected.step, expected.time)
         assert np.array_equal(result.positions, expected.positions)
@@ -155,7 +155,7 @@ def test_a_failed_step_is_counted_and_gets_no_frame(tmp_path, make_simulation):
     assert (summary["steps"], summary["converged"], summary["failed_steps"]) == (0, False, [1])
     assert summary["iterations_max"] == 1
     assert list(run.iterations_per_step().converged) == [False]
-    assert run.load_checkpoint()[1] == 0
+    assert run.checkpoint.steps_done == 0
 
 
 def test_accepted_failures_are_counted(make_run):
@@ -201,7 +201,7 @@ def test_a_run_that_was_killed_is_readable(tmp_path, make_simulation):
     assert run.summary["steps"] == 3
     assert run.summary["factorizations"] == sum(result.factorizations for result in results)
     assert run.frame_steps == [0, 1, 2, 3]
-    assert run.load_checkpoint()[1] == 3
+    assert run.checkpoint.steps_done == 3
 
 
 def test_an_interrupted_run_keeps_what_was_computed(tmp_path, make_simulation):
@@ -263,5 +263,5 @@ def test_the_summary_is_strict_json(make_run):
 def test_nothing_else_lies_in_a_run_directory(make_run):
     run = make_run(steps=1)
     names = {path.relative_to(run.directory) for path in run.directory.rglob("*") if path.is_file()}
-    files = ["run.json", "scene.yaml", "mesh.npz", "stats.csv", "checkpoint.npz", "summary.json"]
+    files = ["run.json", "scene.yaml", "mesh.npz", "stats.csv", "checkpoint.npz", "summary.json", "run.lock"]
     assert names == {*map(Path, files), Path("frames/000000.npz"), Path("frames/000001.npz")}

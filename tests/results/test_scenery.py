@@ -73,7 +73,7 @@ def test_a_run_of_one_body_alone_has_the_arrays_that_it_needs(make_run):
 
 def test_a_run_goes_on_from_its_checkpoint_to_the_same_bits(run):
     resumed, straight = make_simulation(), make_simulation()
-    resumed.restore(*run.load_checkpoint())
+    run.restore(resumed)
     last = [*resumed.run(2)][-1]
     expected = [*straight.run(5)][-1]
     np.testing.assert_array_equal(last.positions, expected.positions)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,9 @@ from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS
 from qlb.scenes import SCENES, load_scene, scene_yaml
 from qlb.solvers import SOLVERS
+
+if TYPE_CHECKING:
+    from qlb.studies.run import Outcome
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -38,6 +41,7 @@ SolverOption = Annotated[str | None, typer.Option(help=" | ".join(SOLVERS))]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; all that the process may use by default")]
 OutOption = Annotated[Path | None, typer.Option(help="Where to write; by default the next free runs/NAME-001")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in the output folder")]
+PictureOption = Annotated[bool, typer.Option(help="Render the picture of chosen frames")]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="One line per step")]
 
 
@@ -52,10 +56,9 @@ def run(
     out: OutOption = None,
     overwrite: OverwriteOption = False,
     verbose: VerboseOption = False,
-    picture: Annotated[bool, typer.Option(help="Render the picture of chosen frames")] = True,
+    picture: PictureOption = True,
 ) -> None:
     """Run a scene; leave frames, statistics, a plot, a picture and a report."""
-    from qlb.results import finish_run
     from qlb.studies import run_scene
 
     changes = {"steps": steps, "solver": solver, "integrator": integrator, "threads": threads}
@@ -63,10 +66,23 @@ def run(
     directory = out or _free_directory(scene)
     with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
         outcome = run_scene(settings, directory, overwrite=overwrite, on_step=reporter, stop=interrupt)
-    with console.status("Writing the report") if console.is_terminal else _quiet():
-        files = finish_run(directory, picture=picture)
-    print_outcome(outcome.summary, files)
-    raise typer.Exit(_status(outcome.summary))
+    raise typer.Exit(_finish(outcome, picture=picture))
+
+
+@app.command()
+def resume(
+    directory: Annotated[Path, typer.Argument(help="A run directory, of a run that was broken off or is to go on")],
+    steps: Annotated[int | None, typer.Option(help="Steps in all; by default as many as the scene says")] = None,
+    verbose: VerboseOption = False,
+    picture: PictureOption = True,
+) -> None:
+    """Go on from the last finished step of a run, to the same bits as if it had never been broken off."""
+    from qlb.studies import resume_run, scene_of
+
+    settings = scene_of(directory, steps)
+    with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
+        outcome = resume_run(directory, steps=steps, on_step=reporter, stop=interrupt)
+    raise typer.Exit(_finish(outcome, picture=picture))
 
 
 @app.command()
@@ -160,6 +176,16 @@ def doctor() -> None:
     from qlb.cli.doctor import examine
 
     raise typer.Exit(examine())
+
+
+def _finish(outcome: Outcome, *, picture: bool) -> int:
+    """Write the report of a run and say how it ended; returns the exit status."""
+    from qlb.results import finish_run
+
+    with console.status("Writing the report") if console.is_terminal else _quiet():
+        files = finish_run(outcome.directory, picture=picture)
+    print_outcome(outcome.summary, files)
+    return _status(outcome.summary)
 
 
 def _overrides(options: Mapping[str, object]) -> list[str]:

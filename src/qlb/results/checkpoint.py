@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.integrators import State
-from qlb.results.files import Arrays, read_arrays, write_arrays
+from qlb.results.files import Arrays, read_arrays, require_shapes, write_arrays
 from qlb.simulation import Simulation
 
 _SOLVER = "solver/"
+_SECONDS = "seconds/"
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class Checkpoint:
     """how many steps lie behind `state`"""
     solver: dict[str, FloatArray]
     """what `solver.save()` gave"""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """what the clock of the run counted so far (`LoopClock.saved`) [s]"""
+    run: str = ""
+    """id of the run that it belongs to"""
 
     @staticmethod
     def of(simulation: Simulation) -> Checkpoint:
@@ -33,7 +38,8 @@ class Checkpoint:
 
     def write(self, path: Path) -> None:
         """Write a checkpoint.npz. Raises `WriteError`."""
-        arrays: Arrays = {"step": np.array(self.steps_done), **_state_arrays(self.state)}
+        arrays: Arrays = {"run": np.array(self.run), "step": np.array(self.steps_done), **_state_arrays(self.state)}
+        arrays |= {_SECONDS + name: np.array(value) for name, value in self.seconds.items()}
         if self.state.previous is not None:
             arrays |= {f"previous_{name}": array for name, array in _state_arrays(self.state.previous).items()}
         write_arrays(path, arrays | {_SOLVER + name: array for name, array in self.solver.items()})
@@ -45,14 +51,17 @@ class Checkpoint:
         Raises:
             InputError: it is missing, damaged, or of another mesh.
         """
-        arrays = read_arrays(path, {"step": (), **_state_shapes("", nodes)})
+        arrays = read_arrays(path, {"run": (), "step": (), **_state_shapes("", nodes)})
         previous = None
         if "previous_time" in arrays:
             if set(_state_shapes("previous_", nodes)) - set(arrays):
                 raise InputError(f"{path} is not what it should be: its previous state is not whole")
             previous = _state(arrays, "previous_", None)
         solver = {name.removeprefix(_SOLVER): a for name, a in arrays.items() if name.startswith(_SOLVER)}
-        return Checkpoint(_state(arrays, "", previous), int(arrays["step"]), solver)
+        timed = [name for name in arrays if name.startswith(_SECONDS)]
+        require_shapes(path, arrays, dict.fromkeys(timed, ()))
+        seconds = {name.removeprefix(_SECONDS): float(arrays[name]) for name in timed}
+        return Checkpoint(_state(arrays, "", previous), int(arrays["step"]), solver, seconds, str(arrays["run"]))
 
 
 def _state_arrays(state: State) -> Arrays:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from time import perf_counter, process_time
 
@@ -14,20 +14,29 @@ class LoopClock:
 
     Attributes:
         wall: seconds by the wall clock.
-        cpu: seconds of all threads of this process.
+        cpu: seconds of all threads of the process.
+
+    Args:
+        timer: that of the simulation.
+        earlier: what `saved()` gave before a run was resumed.
     """
 
-    def __init__(self, timer: Timer) -> None:
-        self.wall = self.cpu = 0.0
+    def __init__(self, timer: Timer, earlier: Mapping[str, float] | None = None) -> None:
+        before = earlier or {}
+        self.wall, self.cpu = before.get("wall", 0.0), before.get("cpu", 0.0)
         self._timer = timer
         timer.lap()
-        self._before = dict(timer.seconds)
+        self._before = {part: timer.seconds[part] - before.get(part, 0.0) for part in PARTS}
         self._start = (perf_counter(), process_time())
 
     @property
     def seconds(self) -> dict[str, float]:
         """Wall-clock seconds by part (`qlb.timing.PARTS`); they add up to `wall`, but for rounding."""
         return {part: self._timer.seconds[part] - self._before[part] for part in PARTS}
+
+    def saved(self) -> dict[str, float]:
+        """All seconds, for a checkpoint."""
+        return {"wall": self.wall, "cpu": self.cpu, **self.seconds}
 
     @contextmanager
     def stopped(self) -> Iterator[None]:

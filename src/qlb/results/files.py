@@ -48,10 +48,11 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_arrays(path: Path, arrays: Mapping[str, npt.ArrayLike]) -> None:
-    """Write named arrays as an uncompressed npz file, whose members carry a CRC-32. Raises `WriteError`."""
+def write_arrays(path: Path, arrays: Mapping[str, npt.ArrayLike], *, compress: bool = False) -> None:
+    """Write named arrays as an npz file, whose members carry a CRC-32. Raises `WriteError`."""
+    save = np.savez_compressed if compress else np.savez
     with replacing(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, allow_pickle=False, **{name: np.asarray(array) for name, array in arrays.items()})
+        save(file, allow_pickle=False, **{name: np.asarray(array) for name, array in arrays.items()})
 
 
 def append_text(path: Path, text: str) -> None:

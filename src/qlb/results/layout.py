@@ -2,7 +2,7 @@
 
 Format version 1::
 
-    run.json            {"format": "qlb run", "version": 1, "created": ISO 8601}: the marker, written first
+    run.json            {"format": "qlb run", "version": 1, "id": ..., "created": ISO 8601}: the marker, written first
     scene.yaml          the resolved scene
     mesh.npz            positions [m] (n, 3) at rest, tets (m, 4) of all bodies; where there are several, or obstacles:
                         groups (n + q,), body_names; obstacle_names, obstacle_vertices [m] (q, 3) at rest,
@@ -14,8 +14,9 @@ Format version 1::
                         run, contact_forces on each node [N] (n + q, 3) and the total on each plane, plane_forces [N]
                         (p, 3); named by the step
     stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
-    checkpoint.npz      what a run needs to go on to the same bits, as of the last frame
+    checkpoint.npz      what a run needs to go on to the same bits, as of the last frame; with the id of the run
     summary.json        the run in numbers; its status is "running" until the end
+    run.lock            held by the process that writes; left behind, and empty
     *.png, report.html  made from the above by `finish_run`
 
 Every file but stats.csv is written next to its place and moved to it, so that it is whole or not there. A step is
@@ -30,6 +31,9 @@ import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from uuid import uuid4
+
+from filelock import FileLock, Timeout
 
 from qlb.errors import InputError
 from qlb.results.files import temporary_name
@@ -44,6 +48,7 @@ FRAMES = "frames"
 STATS = "stats.csv"
 CHECKPOINT = "checkpoint.npz"
 SUMMARY = "summary.json"
+LOCK = "run.lock"
 REPORT = "report.html"
 FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals", "contact", "seconds")}
 """Images of a run, by the name that `finish_run` gives them, in the order of the report."""
@@ -63,8 +68,8 @@ def frame_steps(directory: Path) -> list[int]:
     return sorted(int(match[1]) for name in names if (match := _FRAME.fullmatch(name)))
 
 
-def check_marker(directory: Path) -> None:
-    """Raise `InputError` unless `directory` holds a run of this format version."""
+def check_marker(directory: Path) -> str:
+    """The id of the run in `directory`. Raises `InputError` unless it holds one of this format version."""
     path = directory / MARKER
     try:
         marker = json.loads(path.read_text(encoding="utf-8"))
@@ -80,6 +85,7 @@ def check_marker(directory: Path) -> None:
             f"run {directory} has format version {marker.get('version')!r}, this qlb reads {VERSION}; it was written"
             " by another version of qlb"
         )
+    return str(marker.get("id"))
 
 
 def check_free(directory: Path, *, overwrite: bool) -> None:
@@ -91,7 +97,7 @@ def check_free(directory: Path, *, overwrite: bool) -> None:
     for folder in (directory, directory / FRAMES):
         if folder.is_dir() and not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             raise InputError(f"output folder {directory} cannot be written: no permission; choose another")
-    if not any(directory.iterdir()):
+    if _is_empty(directory):
         return
     try:
         check_marker(directory)
@@ -101,25 +107,55 @@ def check_free(directory: Path, *, overwrite: bool) -> None:
         raise InputError(f"output folder {directory} holds another run; choose another or use --overwrite")
 
 
-def claim(directory: Path, *, overwrite: bool) -> None:
-    """Make `directory` a run directory with nothing but its marker.
+def _is_empty(directory: Path) -> bool:
+    """Whether there is nothing in it but what `claim` leaves when it is killed before the marker is written."""
+    names = {path.name for path in directory.iterdir()} - {LOCK}
+    return not names or (names == {FRAMES} and not any((directory / FRAMES).iterdir()))
+
+
+def lock(directory: Path) -> FileLock:
+    """Keep other processes from writing into a run directory until the lock is released, or this process ends.
 
     Raises:
-        InputError: it is not free (see `check_free`) or cannot be written.
+        InputError: another run holds it, or the lock file cannot be written.
     """
-    check_free(directory, overwrite=overwrite)
+    held = FileLock(directory / LOCK, blocking=False)
     try:
-        if (directory / MARKER).exists():
-            _clear(directory)
-        (directory / FRAMES).mkdir(parents=True, exist_ok=True)
-        created = datetime.now(UTC).isoformat(timespec="seconds")
-        marker = json.dumps({"format": FORMAT, "version": VERSION, "created": created})
-        with (directory / MARKER).open("x", encoding="utf-8") as file:
-            file.write(marker + "\n")
-    except FileExistsError:
+        held.acquire()
+    except Timeout:
         raise InputError(f"output folder {directory} is in use by another run; choose another") from None
     except OSError as error:
         raise InputError(f"output folder {directory} cannot be written: {_line(error)}; choose another") from None
+    return held
+
+
+def claim(directory: Path, *, overwrite: bool) -> FileLock:
+    """Make `directory` a run directory with nothing but its marker; returns the lock on it.
+
+    Raises:
+        InputError: it is not free (see `check_free`), in use by another run, or cannot be written.
+    """
+    check_free(directory, overwrite=overwrite)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        held = lock(directory)
+        if (directory / MARKER).exists():
+            _clear(directory)
+        (directory / FRAMES).mkdir(exist_ok=True)
+        created = datetime.now(UTC).isoformat(timespec="seconds")
+        marker = json.dumps({"format": FORMAT, "version": VERSION, "id": uuid4().hex, "created": created})
+        with (directory / MARKER).open("x", encoding="utf-8") as file:
+            file.write(marker + "\n")
+    except OSError as error:
+        raise InputError(f"output folder {directory} cannot be written: {_line(error)}; choose another") from None
+    return held
+
+
+def remove_frames_after(directory: Path, step: int) -> None:
+    """Delete the frames of later steps, which a kill left behind."""
+    for later in frame_steps(directory):
+        if later > step:
+            frame_path(directory, later).unlink(missing_ok=True)
 
 
 def _clear(directory: Path) -> None:

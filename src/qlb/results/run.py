@@ -14,13 +14,13 @@ import yaml
 
 from qlb.arrays import BoolArray, FloatArray, LongArray
 from qlb.errors import InputError
-from qlb.integrators import State
 from qlb.mesh import TetMesh
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
 from qlb.results.files import read_arrays, require_shapes
 from qlb.results.parts import Parts
 from qlb.results.statistics import Statistics, count_steps, read_statistics, summarise
+from qlb.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Run:
 
     def __init__(self, directory: Path) -> None:
         self.directory = Path(directory)
-        layout.check_marker(self.directory)
+        self.id = layout.check_marker(self.directory)
 
     @cached_property
     def scene(self) -> dict[str, Any]:
@@ -117,10 +117,10 @@ class Run:
         return Frame(
             int(arrays["step"]),
             float(arrays["time"]),
-            arrays["positions"],
-            arrays["velocities"],
+            arrays["positions"].astype(np.float64, copy=False),
+            arrays["velocities"].astype(np.float64, copy=False),
             arrays.get("plane_points", nothing),
-            forces,
+            None if forces is None else forces.astype(np.float64, copy=False),
             None if forces is None else arrays.get("plane_forces", nothing),
         )
 
@@ -148,10 +148,41 @@ class Run:
             np.array([c.converged for c in counts], bool),
         )
 
-    def load_checkpoint(self) -> tuple[State, int, dict[str, FloatArray]]:
-        """State, steps done and solver arrays of the last checkpoint: the arguments of `Simulation.restore`."""
-        checkpoint = Checkpoint.read(self.directory / layout.CHECKPOINT, self.parts.nodes)
-        return checkpoint.state, checkpoint.steps_done, checkpoint.solver
+    @cached_property
+    def checkpoint(self) -> Checkpoint:
+        """What the run needs to go on from its last finished step."""
+        path = self.directory / layout.CHECKPOINT
+        checkpoint = Checkpoint.read(path, self.parts.nodes)
+        if checkpoint.run != self.id:
+            raise InputError(f"{path} is the checkpoint of another run: {checkpoint.run!r}, must be {self.id!r}")
+        return checkpoint
+
+    def restore(self, simulation: Simulation) -> None:
+        """Set a simulation, set up as that of the run was, to where the checkpoint is.
+
+        Raises:
+            InputError: it is another simulation; the message says in what they differ.
+        """
+        self.require_same(simulation)
+        checkpoint = self.checkpoint
+        simulation.restore(checkpoint.state, checkpoint.steps_done, checkpoint.solver)
+
+    def require_same(self, simulation: Simulation) -> None:
+        """Raise `InputError` unless `simulation` has the mesh, integrator, solver and time step of the run."""
+        kept, now = self.parts.arrays(), Parts.of(simulation.assembly).arrays()
+        differ = [name for name in kept.keys() | now.keys() if not np.array_equal(kept.get(name, 0), now.get(name, 0))]
+        if differ:
+            raise InputError(
+                f"run {self.directory} cannot go on: its {', '.join(sorted(differ))} differ from those of the"
+                " simulation; has the scene or a mesh file changed?"
+            )
+        is_now = {"integrator": simulation.integrator.name, "solver": simulation.solver.name, "step": simulation.step}
+        for name, value in is_now.items():
+            if self.summary.get(name) != value:
+                raise InputError(
+                    f"run {self.directory} cannot go on: its {name} is {self.summary.get(name)!r}, that of the"
+                    f" simulation is {value!r}"
+                )
 
 
 def _parsed(path: Path, parse: Callable[[str], object]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import json
 import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -21,8 +22,9 @@ from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
 from qlb.results.clock import LoopClock
 from qlb.results.errors import WriteError
-from qlb.results.files import append_text, write_arrays, write_text
+from qlb.results.files import Arrays, append_text, write_arrays, write_text
 from qlb.results.parts import Parts
+from qlb.results.resume import Earlier, take_up
 from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
 from qlb.simulation import Simulation
 from qlb.step_result import StepFailed, StepResult
@@ -45,11 +47,16 @@ class RunWriter:
         scene: the resolved scene as plain data, kept as scene.yaml.
         simulation: what will run.
         overwrite: replace an earlier run there. Only files that a run wrote are deleted.
+        resume: go on with the run that is there. `simulation` must be set up as it was and at its checkpoint
+            (`Run.restore`); what a kill left behind of later steps goes.
         stride: write a frame and a checkpoint every so many steps; the last step gets them in any case.
+        precision: of the frames, "float64" or "float32".
+        compress: deflate the frames.
 
     Raises:
-        InputError: the directory holds anything else, is a file, or cannot be written (nothing was changed then); the
-            scene is not plain data; stride < 1.
+        InputError: the directory holds anything else, is a file, is in use by another run, or cannot be written
+            (nothing was changed then); the scene is not plain data; stride < 1, another precision; there is no run to
+            go on with, or it is another one.
         WriteError: a file could not be written, as with a full disk. So do all methods.
     """
 
@@ -60,28 +67,50 @@ class RunWriter:
         simulation: Simulation,
         *,
         overwrite: bool = False,
+        resume: bool = False,
         stride: int = 1,
+        precision: Literal["float64", "float32"] = "float64",
+        compress: bool = False,
     ) -> None:
         if stride < 1:
             raise InputError(f"stride = {stride} is out of range: must be >= 1")
+        if precision not in ("float64", "float32"):
+            raise InputError(f"precision = {precision!r} is out of range: must be 'float64' or 'float32'")
         text = _scene_text(scene)
-        layout.check_free(Path(directory), overwrite=overwrite)
         self.directory = Path(directory)
         self._simulation = simulation
-        self._stride = stride
-        self._first_step = simulation.steps_done
-        self._counts: list[StepCount] = []
-        self._now = Checkpoint.of(simulation)
+        self._stride, self._float, self._compress = stride, np.dtype(precision), compress
         self._contact: ContactReport | None = None
-        self._kept = -1
         self._finished = False
-        layout.claim(self.directory, overwrite=overwrite)
-        write_text(self.directory / layout.SCENE, text)
-        write_arrays(self.directory / layout.MESH, Parts.of(simulation.assembly).arrays())
-        append_text(self.directory / layout.STATS, HEADER)
-        self._keep()
-        self._clock = LoopClock(simulation.timer)
-        with self._writing():
+        if resume:
+            layout.check_marker(self.directory)
+        else:
+            layout.check_free(self.directory, overwrite=overwrite)
+        self._now = Checkpoint.of(simulation)
+        self._lock = layout.lock(self.directory) if resume else layout.claim(self.directory, overwrite=overwrite)
+        try:
+            self._id = layout.check_marker(self.directory)
+            earlier = take_up(self.directory, simulation) if resume else None
+            self._clock = LoopClock(simulation.timer, None if earlier is None else earlier.seconds)
+            with self._clock.stopped():
+                self._begin(text, earlier)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _begin(self, scene: str, earlier: Earlier | None) -> None:
+        """Write what there is before the first step."""
+        write_text(self.directory / layout.SCENE, scene)
+        if earlier is None:
+            self._first_step = self._simulation.steps_done
+            self._counts: list[StepCount] = []
+            write_arrays(self.directory / layout.MESH, Parts.of(self._simulation.assembly).arrays())
+            append_text(self.directory / layout.STATS, HEADER)
+            self._write_summary("running", None)
+            self._keep()  # last, since a run with a checkpoint is one that can be read and gone on with
+        else:
+            self._first_step, self._counts = earlier.first_step, earlier.counts
+            self._kept = self._now.steps_done
             self._write_summary("running", None)
 
     def record(self, result: StepResult) -> None:
@@ -111,6 +140,7 @@ class RunWriter:
                     self._keep()
             finally:
                 summary = self._write_summary(status, error)
+        self._lock.release()
         return summary
 
     def __enter__(self) -> Self:
@@ -151,15 +181,15 @@ class RunWriter:
         """Write the frame, then the checkpoint that makes it count."""
         state, step = self._now.state, self._now.steps_done
         frame = {"positions": state.positions, "velocities": state.velocities}
-        if planes := self._simulation.assembly.planes:
-            frame["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
         if self._contact is not None:
             frame["contact_forces"] = self._contact.forces
-            frame |= {"plane_forces": self._contact.plane_forces} if planes else {}
-        write_arrays(
-            layout.frame_path(self.directory, step), {"step": np.int64(step), "time": np.float64(state.time), **frame}
-        )
-        self._now.write(self.directory / layout.CHECKPOINT)
+        arrays: Arrays = {name: values.astype(self._float, copy=False) for name, values in frame.items()}
+        if planes := self._simulation.assembly.planes:
+            arrays["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
+            arrays |= {} if self._contact is None else {"plane_forces": self._contact.plane_forces}
+        arrays |= {"step": np.array(step), "time": np.array(state.time)}
+        write_arrays(layout.frame_path(self.directory, step), arrays, compress=self._compress)
+        replace(self._now, seconds=self._clock.saved(), run=self._id).write(self.directory / layout.CHECKPOINT)
         self._kept = step
 
     def _write_summary(self, status: Status, error: str | None) -> dict[str, Any]:

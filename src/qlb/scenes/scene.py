@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -21,7 +21,11 @@ from qlb.system.system import MassKind
 class OutputSettings(Settings):
     """What a run writes."""
 
-    stride: int = quantity(1, "Write every so many steps a frame", ge=1)
+    stride: int = quantity(1, "Write every so many steps a frame and a checkpoint", ge=1)
+    precision: Literal["float64", "float32"] = Field(
+        "float64", description="of the frames; checkpoints always have float64"
+    )
+    compress: bool = Field(False, description="Deflate the frames: about two thirds of the size, slower to write")
 
 
 class Scene(Settings):

@@ -4,7 +4,7 @@ from qlb.studies.compare import Comparison, SolverCase, compare
 from qlb.studies.reproduce import Plan, Reproduction, plan_figures, reproduce
 from qlb.studies.reproduce_figures import FIGURES, SupplementFigure, chosen_figures
 from qlb.studies.reproduce_processes import Case, Update
-from qlb.studies.run import run_scene
+from qlb.studies.run import resume_run, run_scene, scene_of
 
 __all__ = [
     "FIGURES",
@@ -19,5 +19,7 @@ __all__ = [
     "compare",
     "plan_figures",
     "reproduce",
+    "resume_run",
     "run_scene",
+    "scene_of",
 ]

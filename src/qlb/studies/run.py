@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from qlb.errors import InputError
 from qlb.results import Run, RunWriter
-from qlb.scenes import Scene
+from qlb.results.layout import SCENE
+from qlb.scenes import Scene, load_scene
+from qlb.simulation import Simulation
 from qlb.step_result import StepFailed, StepResult
 
 
@@ -47,10 +50,61 @@ def run_scene(
         InputError: the scene cannot be built, or the directory cannot be used.
     """
     simulation = scene.build()
-    plain, stride = scene.model_dump(mode="json"), scene.output.stride
+    writer = RunWriter(
+        directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite, **scene.output.model_dump()
+    )
+    return _record(writer, simulation, scene.steps, on_step, stop)
+
+
+def resume_run(
+    directory: Path,
+    *,
+    steps: int | None = None,
+    on_step: Callable[[StepResult], None] = lambda result: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """Go on with a run from its last finished step, to the same bits as if it had never been broken off.
+
+    Args:
+        directory: a run directory that `run_scene` wrote.
+        steps: how many steps the run is to have in all; by default as many as its scene says.
+        on_step: called after each new step, the failed one included.
+        stop: asked before each step whether to end early.
+
+    Raises:
+        InputError: no run, or a damaged one; the scene cannot be built, or is not what it was (as with a mesh file that
+            has changed); another process writes there; fewer steps than are done.
+    """
+    run, scene = Run(directory), scene_of(directory, steps)
+    done = run.checkpoint.steps_done
+    if scene.steps < done:
+        raise InputError(f"steps = {scene.steps} is out of range: must be >= {done}, as many as run {directory} has")
+    simulation = scene.build()
+    run.restore(simulation)
+    writer = RunWriter(directory, scene.model_dump(mode="json"), simulation, resume=True, **scene.output.model_dump())
+    return _record(writer, simulation, scene.steps, on_step, stop)
+
+
+def scene_of(directory: Path, steps: int | None = None) -> Scene:
+    """The scene of a run, with another number of steps where given.
+
+    Raises:
+        InputError: no run, or its scene is not one of qlb's, such as that of a script.
+    """
+    return load_scene(str(Run(directory).directory / SCENE), [] if steps is None else [f"steps={steps}"])
+
+
+def _record(
+    writer: RunWriter,
+    simulation: Simulation,
+    steps: int,
+    on_step: Callable[[StepResult], None],
+    stop: Callable[[], bool],
+) -> Outcome:
+    """Step until `steps` are done, or one fails, or it is to stop."""
     try:
-        with RunWriter(directory, plain, simulation, overwrite=overwrite, stride=stride) as writer:
-            for _ in range(scene.steps):
+        with writer:
+            while simulation.steps_done < steps:
                 if stop():
                     writer.finish("interrupted")
                     break
@@ -61,4 +115,4 @@ def run_scene(
         on_step(failure.result)
     except KeyboardInterrupt:
         pass
-    return Outcome(directory, Run(directory).summary)
+    return Outcome(writer.directory, Run(writer.directory).summary)
