@@ -10,11 +10,11 @@ import numpy as np
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.integrators import State
-from qlb.results.files import Arrays, read_arrays, require_shapes, write_arrays
+from qlb.results.clock import COUNTED
+from qlb.results.files import Arrays, read_arrays, write_arrays
 from qlb.simulation import Simulation
 
 _SOLVER = "solver/"
-_SECONDS = "seconds/"
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Checkpoint:
     def write(self, path: Path) -> None:
         """Write a checkpoint.npz. Raises `WriteError`."""
         arrays: Arrays = {"run": np.array(self.run), "step": np.array(self.steps_done), **_state_arrays(self.state)}
-        arrays |= {_SECONDS + name: np.array(value) for name, value in self.seconds.items()}
+        arrays["seconds"] = np.array([self.seconds.get(name, 0.0) for name in COUNTED])
         if self.state.previous is not None:
             arrays |= {f"previous_{name}": array for name, array in _state_arrays(self.state.previous).items()}
         write_arrays(path, arrays | {_SOLVER + name: array for name, array in self.solver.items()})
@@ -51,16 +51,14 @@ class Checkpoint:
         Raises:
             InputError: it is missing, damaged, or of another mesh.
         """
-        arrays = read_arrays(path, {"run": (), "step": (), **_state_shapes("", nodes)})
+        arrays = read_arrays(path, {"run": (), "step": (), "seconds": (len(COUNTED),), **_state_shapes("", nodes)})
         previous = None
         if "previous_time" in arrays:
             if set(_state_shapes("previous_", nodes)) - set(arrays):
                 raise InputError(f"{path} is not what it should be: its previous state is not whole")
             previous = _state(arrays, "previous_", None)
         solver = {name.removeprefix(_SOLVER): a for name, a in arrays.items() if name.startswith(_SOLVER)}
-        timed = [name for name in arrays if name.startswith(_SECONDS)]
-        require_shapes(path, arrays, dict.fromkeys(timed, ()))
-        seconds = {name.removeprefix(_SECONDS): float(arrays[name]) for name in timed}
+        seconds = dict(zip(COUNTED, arrays["seconds"].tolist(), strict=True))
         return Checkpoint(_state(arrays, "", previous), int(arrays["step"]), solver, seconds, str(arrays["run"]))
 
 

@@ -8,6 +8,9 @@ from time import perf_counter, process_time
 
 from qlb.timing import PARTS, Timer
 
+COUNTED = ("wall", "cpu", *PARTS)
+"""What a clock counts."""
+
 
 class LoopClock:
     """Runs from when it is made, except inside `stopped()`, whose time it keeps out of the simulation's timer too.
@@ -35,7 +38,7 @@ class LoopClock:
         return {part: self._timer.seconds[part] - self._before[part] for part in PARTS}
 
     def saved(self) -> dict[str, float]:
-        """All seconds, for a checkpoint."""
+        """All seconds by name (`COUNTED`), for a checkpoint."""
         return {"wall": self.wall, "cpu": self.cpu, **self.seconds}
 
     @contextmanager
