@@ -101,7 +101,7 @@ def test_a_run_cut_around_the_release_gives_the_same_bits(
     with RunWriter(tmp_path, {"scene": "mine"}, first) as writer:
         for result in first.run(cut):
             writer.record(result)
-    second.restore(*Run(tmp_path).load_checkpoint())
+    Run(tmp_path).restore(second)
     finish(second, 7 - cut)
     np.testing.assert_array_equal(second.state.positions, whole.state.positions)
     np.testing.assert_array_equal(second.state.velocities, whole.state.velocities)

@@ -16,6 +16,8 @@ import numpy as np
 import yaml
 
 from qlb import _native
+from qlb.analysis import Constitution
+from qlb.analysis.snapshot import load_energy
 from qlb.contact import ContactReport
 from qlb.errors import InputError
 from qlb.results import layout
@@ -105,6 +107,7 @@ class RunWriter:
             self._first_step = self._simulation.steps_done
             self._counts: list[StepCount] = []
             write_arrays(self.directory / layout.MESH, Parts.of(self._simulation.assembly).arrays())
+            write_arrays(self.directory / layout.MATERIALS, Constitution.of(self._simulation).arrays())
             append_text(self.directory / layout.STATS, HEADER)
             self._write_summary("running", None)
             self._keep()  # last, since a run with a checkpoint is one that can be read and gone on with
@@ -180,13 +183,19 @@ class RunWriter:
     def _keep(self) -> None:
         """Write the frame, then the checkpoint that makes it count."""
         state, step = self._now.state, self._now.steps_done
+        system = self._simulation.system
         frame = {"positions": state.positions, "velocities": state.velocities}
         if self._contact is not None:
             frame["contact_forces"] = self._contact.forces
         arrays: Arrays = {name: values.astype(self._float, copy=False) for name, values in frame.items()}
+        arrays["gravity"] = system.gravity.acceleration(state.time)
+        if system.added:
+            arrays["load_energy"] = np.array(load_energy(system, state, self._simulation.step))
         if planes := self._simulation.assembly.planes:
             arrays["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
-            arrays |= {} if self._contact is None else {"plane_forces": self._contact.plane_forces}
+        if self._contact is not None:
+            arrays["contact_energy"] = np.array(self._contact.energy)
+            arrays |= {"plane_forces": self._contact.plane_forces} if planes else {}
         arrays |= {"step": np.array(step), "time": np.array(state.time)}
         write_arrays(layout.frame_path(self.directory, step), arrays, compress=self._compress)
         replace(self._now, seconds=self._clock.saved(), run=self._id).write(self.directory / layout.CHECKPOINT)
