@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 def folder() -> Path | None:
-    """Where meshes are kept: QLB_CACHE if it names a folder, else qlb in XDG_CACHE_HOME or ~/.cache. None: QLB_CACHE=0."""
+    """Where meshes are kept: the folder QLB_CACHE, else qlb in XDG_CACHE_HOME or ~/.cache; None for QLB_CACHE=0."""
     chosen = os.environ.get("QLB_CACHE", "")
     if chosen:
         return None if chosen == "0" else Path(chosen)

@@ -39,13 +39,15 @@ class _Child:
 
     def ask(self, header: dict[str, Any], arrays: Arrays, seconds: float) -> tuple[dict[str, Any], Arrays]:
         """The answer. Raises `EOFError` where the process has ended, `TimeoutError` where it took too long."""
-        assert self._process.stdin is not None and self._process.stdout is not None
+        requests, answers = self._process.stdin, self._process.stdout
+        assert requests is not None
+        assert answers is not None
         timer = threading.Timer(seconds, self._time_out)
         timer.daemon = True
         timer.start()
         try:
-            worker.send(self._process.stdin, header, arrays)
-            return worker.receive(self._process.stdout)
+            worker.send(requests, header, arrays)
+            return worker.receive(answers)
         except (EOFError, OSError):
             self.end()
             if self._timed_out:

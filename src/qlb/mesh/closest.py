@@ -127,4 +127,4 @@ def point_triangle_distance(points: FloatArray, corners: FloatArray) -> FloatArr
     length = np.linalg.norm(normal, axis=1)
     inside = (np.einsum("kij,kij->ki", np.cross(sides, away), np.repeat(normal[:, None], 3, axis=1)) >= 0).all(axis=1)
     to_plane = np.abs(np.einsum("ij,ij->i", away[:, 0], normal)) / np.maximum(length, 1e-300)
-    return np.where(inside & (length > 0), to_plane, to_edges)
+    return np.asarray(np.where(inside & (length > 0), to_plane, to_edges))

@@ -220,7 +220,7 @@ def _version() -> str:
 
 def _to_cache(key: str, mesh: TetMesh, numbers: dict[str, float]) -> None:
     surface = mesh.rendered()
-    arrays = {"positions": mesh.positions, "tets": mesh.tets, "numbers": np.array(json.dumps(numbers))}
+    arrays: cache.Arrays = {"positions": mesh.positions, "tets": mesh.tets, "numbers": np.array(json.dumps(numbers))}
     cache.store(key, arrays | {"owners": surface.tets, "weights": surface.weights})
 
 

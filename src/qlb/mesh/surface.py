@@ -45,7 +45,7 @@ class SurfaceReport:
         if self.boundary_edges:
             notes.append(
                 f"the surface is open: {_count(self.boundary_edges, 'boundary edge')} around"
-                f" {_count(self.holes, 'hole')}; the holes were closed"
+                f" {_count(self.holes, 'hole')}; filling closes them"
             )
         if self.branching_edges:
             notes.append(f"{_count(self.branching_edges, 'edge')} with more than two triangles; the outside was kept")
@@ -56,6 +56,22 @@ class SurfaceReport:
         if self.components > 1:
             notes.append(f"the surface has {self.components} components")
         return notes
+
+    def rows(self) -> list[tuple[str, str]]:
+        """What it is, and its value, to be printed; what a sound surface has none of is left out."""
+        rows = [
+            ("vertices, triangles", f"{self.vertices}, {self.triangles}"),
+            ("components", f"{self.components}"),
+            ("boundary edges, holes", f"{self.boundary_edges}, {self.holes}"),
+        ]
+        defects = {
+            "edges of 3 or more triangles": self.branching_edges,
+            "triangles without area, dropped": self.degenerate,
+            "doubled triangles, dropped": self.duplicate,
+            "triangles turned over": self.turned,
+            "one-sided components": self.one_sided,
+        }
+        return rows + [(name, f"{value}") for name, value in defects.items() if value]
 
 
 def _count(number: int, what: str) -> str:

@@ -123,6 +123,18 @@ class TetMesh:
 
         return load(Path(path), edge=edge, tets=tets)
 
+    def write(self, path: str | Path) -> None:
+        """Write nodes and tets, in the format that the suffix of `path` asks for (.msh, .vtu, .vtk, .mesh, ...).
+
+        Regions are kept by .msh, .vtu, .vtk, .mesh, .xdmf and .med files. A surface is not written.
+
+        Raises:
+            InputError: a suffix whose format holds no tets, or a file that cannot be written.
+        """
+        from qlb.mesh.writing import write_tets
+
+        write_tets(self, Path(path))
+
     @staticmethod
     def union(meshes: Sequence[TetMesh]) -> TetMesh:
         """Nodes and tets of one mesh after the other; the mesh itself where there is one.

@@ -20,7 +20,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -59,10 +59,10 @@ def read(path: Path) -> tuple[dict[str, Any], Arrays]:
 
 def fill(header: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays]:
     """Tets within a surface, by fTetWild."""
-    import pytetwild
+    from pytetwild import tetrahedralize  # type: ignore[attr-defined]
 
     os.chdir(header["folder"])  # where fTetWild leaves a file behind
-    positions, tets = pytetwild.tetrahedralize(
+    positions, tets = tetrahedralize(
         arrays["vertices"],
         arrays["triangles"],
         edge_length_abs=header["edge"],
@@ -74,7 +74,7 @@ def fill(header: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays
 
 
 def _limit_memory(spare: int | None) -> None:
-    """Let the address space grow by `spare` bytes at most; None: as it was. Where there is no such limit, do nothing."""
+    """Let the address space grow by `spare` bytes at most; None: as it was. Nothing happens where that has no limit."""
     try:
         import resource
 
@@ -182,7 +182,7 @@ def _joined(parts: list[tuple[Any, Any, Any]]) -> Arrays:
     }
 
 
-def send(stream: BinaryIO, header: dict[str, Any], arrays: Arrays) -> None:
+def send(stream: IO[bytes], header: dict[str, Any], arrays: Arrays) -> None:
     """Write a message."""
     described = [(name, array.dtype.str, array.shape) for name, array in arrays.items()]
     stream.write(json.dumps(header | {"arrays": described}).encode() + b"\n")
@@ -191,7 +191,7 @@ def send(stream: BinaryIO, header: dict[str, Any], arrays: Arrays) -> None:
     stream.flush()
 
 
-def receive(stream: BinaryIO) -> tuple[dict[str, Any], Arrays]:
+def receive(stream: IO[bytes]) -> tuple[dict[str, Any], Arrays]:
     """Read a message. Raises `EOFError` where the other side has gone."""
     line = stream.readline()
     if not line.endswith(b"\n"):
