@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -11,18 +10,24 @@ from pydantic import Field
 from qlb.materials import Fibres
 from qlb.mesh import TetMesh
 from qlb.scenes.loads import Vector
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import Scene
 from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 from qlb.system import Rotation
 
 
-class BoxMeshSettings(Settings):
+class BoxMeshSettings(MeshSource):
     """A box of tetrahedra, or a mesh file."""
 
     size: Vector = Field((1.0, 0.25, 0.25), description="Lengths of the box [m]")
     cells: tuple[int, int, int] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
-    path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the box")
+
+    def make(self) -> TetMesh:
+        """The mesh. Raises `InputError` where the file or a setting is wrong."""
+        if self.path is None:
+            return TetMesh.box(self.size, cells=self.cells)
+        return TetMesh.load(self.path, **self.target())
 
 
 class TwistSettings(Settings):
@@ -43,11 +48,7 @@ class BarScene(Scene):
 
     def build(self) -> Simulation:
         """The bar with its ends held. Raises `InputError` where mesh or settings are wrong."""
-        mesh = (
-            TetMesh.box(self.mesh.size, cells=self.mesh.cells)
-            if self.mesh.path is None
-            else TetMesh.read(self.mesh.path)
-        )
+        mesh = self.mesh.make()
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         near = 1e-6 * (high[0] - low[0])
         simulation = Simulation(mesh, **self.simulation_arguments() | self._composition(mesh))
