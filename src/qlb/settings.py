@@ -14,6 +14,7 @@ from pydantic import (
     PlainSerializer,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
 )
 from pydantic._internal._model_construction import ModelMetaclass
@@ -41,7 +42,19 @@ def plain(value: Any) -> Any:
 FilePath = Annotated[Path, PlainSerializer(plain, when_used="json")]
 """A file. In a scene file it is relative to that file; it is written as absolute."""
 
-PerElement = Annotated[float | FloatArray | Varying, PlainSerializer(plain, when_used="json")]
+_NUMBER = {"type": "number"}
+_PER_ELEMENT: dict[str, Any] = {
+    "anyOf": [
+        _NUMBER,
+        {"type": "string"},
+        {"type": "array", "items": _NUMBER},
+        {"type": "object", "patternProperties": {"^(-?[0-9]+|default)$": _NUMBER}, "additionalProperties": False},
+    ]
+}
+
+PerElement = Annotated[
+    float | FloatArray | Varying, PlainSerializer(plain, when_used="json"), WithJsonSchema(_PER_ELEMENT)
+]
 """A value in each element: one number for all, an array (m,), a table by region {1: 2e4, "default": 5e4}, an expression
 of the rest position such as "2e4 * (1 + x)", or a function of the elements' centroids (m, 3) [m] that gives (m,)."""
 
