@@ -29,6 +29,7 @@ from qlb.timing import Timer
 T = TypeVar("T")
 OnFailure = Literal["stop", "halve", "accept"]
 MAX_HALVINGS = 8
+ROUNDING = 1e-6  # of a step
 
 
 class Simulation:
@@ -136,17 +137,21 @@ class Simulation:
         """
         return self.assembly.nodes_of(body)
 
-    def pin(self, nodes: npt.ArrayLike, axes: str = "xyz") -> None:
-        """Hold nodes where they are now, in all or some directions. Raises `InputError` (see `HeldNodes.hold`)."""
-        self._before_first_step("pin nodes")
-        self._held.hold(nodes, self._state.positions, axes=axes)
+    def pin(self, nodes: npt.ArrayLike, axes: str = "xyz", until: float | None = None) -> None:
+        """Hold nodes where they are now, in all or some directions. Raises `InputError` (see `HeldNodes.hold`).
 
-    def move(self, nodes: npt.ArrayLike, motion: Motion, axes: str = "xyz") -> None:
+        Where `until` [s] is given, the first step that begins then or later takes them as free, and they go on with the
+        velocity they had: none, or that of their script. The integrator starts anew there, which keeps its order.
+        """
+        self._before_first_step("pin nodes")
+        self._held.hold(nodes, self._state.positions, axes=axes, until=until)
+
+    def move(self, nodes: npt.ArrayLike, motion: Motion, axes: str = "xyz", until: float | None = None) -> None:
         """Move nodes by a script, in all or some directions: `Translation`, `Rotation`, `Keyframes` or any function
-        motion(positions at time 0 (k, 3), time [s]) -> positions (k, 3) [m]. Raises `InputError` as `pin` does.
+        motion(positions at time 0 (k, 3), time [s]) -> positions (k, 3) [m]. `until` and errors as those of `pin`.
         """
         self._before_first_step("move nodes")
-        self._held.hold(nodes, self._state.positions, motion, axes)
+        self._held.hold(nodes, self._state.positions, motion, axes, until)
 
     def add(self, energy: Energy) -> None:
         """Add a load (`PointForce`, `Traction`, `Pressure`) or an energy of your own (`StencilEnergy`, `NodalEnergy`).
@@ -208,7 +213,7 @@ class Simulation:
                 mass=self.mass,
                 damping=self.damping,
                 energies=self._energies,
-                held=self._held,
+                held=self._held_at(self._state.time),
                 contact=self.contact,
                 threads=self.threads,
             )
@@ -220,9 +225,22 @@ class Simulation:
     def solver(self) -> Descent:
         """The nonlinear solver, which owns the factor; made when first asked for."""
         if self._solver is None:
-            self._solver = self._solver_class(self.system, self.solver_settings, self.tolerance)
+            self._solver = self._new_solver()
             self.timer.restart()
         return self._solver
+
+    def _new_solver(self) -> Descent:
+        return self._solver_class(self.system, self.solver_settings, self.tolerance)
+
+    def _held_at(self, time: float) -> HeldNodes:
+        """What a step holds that begins at `time` [s], which is a sum and so rounded."""
+        return self._held.at(time + ROUNDING * self.step)
+
+    def _hold(self, held: HeldNodes) -> None:
+        """Set up system and solver anew where they were set up for other held nodes."""
+        if self._system is not None and not np.array_equal(self._system.held.fixed, held.fixed):
+            self._system = self._system.holding(held)
+            self._solver = self._solver and self._new_solver()
 
     def restore(self, state: State, steps_done: int, solver: dict[str, FloatArray]) -> None:
         """Go on from a checkpoint: a state, the number of steps behind it, and what `solver.save()` gave then.
@@ -235,6 +253,7 @@ class Simulation:
             _require(f"shape of {name}", np.shape(values), str(shape), np.shape(values) == shape)
             vectors(name, values, shape)
         self._state, self._steps_done = state, steps_done
+        self._hold(self._held_at(state.time))
         self.solver.load(solver)
 
     def run(self, steps: int) -> Iterator[StepResult]:
@@ -253,16 +272,20 @@ class Simulation:
         parts = 1
         if self.on_failure == "halve" and not all(s.reason.converged for s in solves):
             state, solves, parts = self._take_halves(self._state, self.step, solves)
-        step = self._steps_done + 1
+        step, last, end = self._steps_done + 1, self._state, self._state.time + self.step
+        held = self._held_at(end)
+        releases = not np.array_equal(held.fixed, self.system.held.fixed)
+        if releases:
+            state = replace(state, velocities=self.system.held.velocities_at(state.velocities, last.time, end))
         result = StepResult(
             step, state.time, state.positions, state.velocities, solves, self._contact_report(solves[-1]), parts
         )
         if not result.converged and (self.on_failure != "accept" or not _finite(state)):
             raise StepFailed(failure_message(result, self.solver.name), result)
         self._check_contact(result)
-        last = self._state
-        self._state = replace(state, time=last.time + self.step, previous=last.without_history())
+        self._state = replace(state, time=end, previous=None if releases else last.without_history())
         self._steps_done = step
+        self._hold(held)
         return result
 
     def _contact_report(self, solve: SolveResult) -> ContactReport | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -116,6 +117,12 @@ class System:
         self.contact = (
             None if contact is None else ContactModel(contact, _surroundings(whole, float(modulus.max()), threads))
         )
+
+    def holding(self, held: HeldNodes) -> System:
+        """The same system with other nodes held: all but the factor of a solver is shared with this one."""
+        other = copy(self)
+        other.held, other._fixed = held, np.flatnonzero(held.fixed.ravel())
+        return other
 
     def _damping_terms(self) -> list[Term]:
         terms: list[Term] = []
