@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,11 +18,14 @@ from qlb.simulation import Simulation
 from qlb.system import Rotation
 
 
+Cells = Annotated[int, Field(le=1_000_000)]
+
+
 class BoxMeshSettings(Settings):
     """A box of tetrahedra, or a mesh file."""
 
     size: Vector = Field((1.0, 0.25, 0.25), description="Lengths of the box [m]")
-    cells: tuple[int, int, int] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
+    cells: tuple[Cells, Cells, Cells] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
     path: FilePath | None = Field(None, description="A tetrahedral mesh file to use instead of the box")
 
 

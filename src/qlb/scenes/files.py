@@ -97,9 +97,10 @@ def _kind(document: Document) -> type[Scene]:
     if name is None and "scene" not in data:
         if "bodies" in data:
             return SCENES["bodies"]
-        keys = [unknown_key(str(key), ["scene", "bodies"]) for key in data if str(key) not in _all_keys()]
-        hint = f"; {keys[0]}" if keys else ""
-        raise source.located(SettingError("", f"scene is missing: it names a scene, and bodies lists your own{hint}"))
+        unknown = next((str(key) for key in data if str(key) not in _all_keys()), "")
+        hint = f"; {unknown_key(unknown, ['scene', 'bodies'])}" if unknown else ""
+        problem = f"scene is missing: it names a scene, and bodies lists your own{hint}"
+        raise source.located(SettingError(unknown, problem))
     if not isinstance(name, str) or name not in SCENES:
         known = f"built-in scenes: {', '.join(SCENES)}"
         raise source.located(SettingError("scene", f"scene = {_shown(name)} is not known; {known}"))

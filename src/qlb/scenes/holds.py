@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
@@ -27,10 +27,6 @@ class HoldSettings(OfBody):
     axes: Annotated[str, AfterValidator(_axes)] = Field("xyz", description="Directions that are held, such as y or xz")
     until: float | None = quantity(None, "When they are let go; never by default", unit="s", gt=0)
 
-    def release(self) -> dict[str, Any]:
-        """The keyword argument of `Simulation.pin` and `move` that says when, if ever, they are let go."""
-        return {} if self.until is None else {"until": self.until}
-
 
 class PinSettings(HoldSettings):
     """Nodes that are held where they are at rest."""
@@ -39,7 +35,7 @@ class PinSettings(HoldSettings):
         """Hold them. Raises `InputError` with what lies at `key`."""
         nodes = self.select_nodes(simulation, key, self.nodes)
         with at_key(key):
-            simulation.pin(nodes, self.axes, **self.release())
+            simulation.pin(nodes, self.axes, until=self.until)
 
 
 class HandleSettings(HoldSettings):
@@ -51,4 +47,4 @@ class HandleSettings(HoldSettings):
         """Move them. Raises `InputError` with what lies at `key`."""
         nodes = self.select_nodes(simulation, key, self.nodes)
         with at_key(key):
-            simulation.move(nodes, self.motion.motion(), self.axes, **self.release())
+            simulation.move(nodes, self.motion.motion(), self.axes, until=self.until)

@@ -24,8 +24,9 @@ def override(kind: type[BaseModel], data: dict[str, Any], pair: str) -> str:
         raise InputError(f"--set {pair!r} must have the form KEY=VALUE")
     valid = key_fields(kind)
     parts = key.split(".")
-    if ".".join(ENTRY if _is_index(part) else part for part in parts) not in valid:
-        raise InputError(unknown_key(key, valid))
+    pattern = ".".join(ENTRY if _is_index(part) else part for part in parts)
+    if not any(f"{known}.".startswith(f"{pattern}.") for known in valid):
+        raise InputError(unknown_key(key, (_numbered(known, parts) for known in valid)))
     place: Any = data
     for depth, (part, following) in enumerate(itertools.pairwise(parts), start=1):
         index = _index(place, part, ".".join(parts[: depth - 1]))
@@ -36,6 +37,12 @@ def override(kind: type[BaseModel], data: dict[str, Any], pair: str) -> str:
             raise InputError(f"{'.'.join(parts[:depth])} = {place!r} must hold keys and values")
     place[_index(place, parts[-1], ".".join(parts[:-1]))] = _value(text)
     return key
+
+
+def _numbered(known: str, parts: list[str]) -> str:
+    """A key of `key_fields` with the numbers of entries that `parts` have, or 0."""
+    numbers = iter([part for part in parts if _is_index(part)])
+    return ".".join(next(numbers, "0") if part == ENTRY else part for part in known.split("."))
 
 
 def _is_index(part: str) -> bool:

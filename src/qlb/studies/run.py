@@ -47,6 +47,8 @@ def run_scene(
         InputError: the scene cannot be built, or the directory cannot be used.
     """
     simulation = scene.build()
+    with scene.located():
+        _ = simulation.system  # what only shows when everything is there
     plain, stride = scene.model_dump(mode="json"), scene.output.stride
     try:
         with RunWriter(directory, plain, simulation, overwrite=overwrite, stride=stride) as writer:
