@@ -181,6 +181,16 @@ def scenes(
 
 
 @app.command()
+def schema() -> None:
+    """Print the JSON Schema of scene files, for editors."""
+    import json
+
+    from qlb.scenes.schema import scene_schema
+
+    sys.stdout.write(json.dumps(scene_schema(), indent=1) + "\n")
+
+
+@app.command()
 def report(directory: Annotated[Path, typer.Argument(help="A run directory")]) -> None:
     """Write plots, picture and report of a run again."""
     from qlb.results import Run, finish_run

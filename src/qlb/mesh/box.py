@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from itertools import permutations
+from math import prod
 
 import numpy as np
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
 from qlb.mesh.geometry import signed_volumes
+
+MOST_TETS = 2e7
+"""More fit no workstation: a million take some 4 GiB."""
 
 
 def kuhn_box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[FloatArray, IntArray]:
@@ -27,6 +31,9 @@ def kuhn_box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> t
         raise InputError(f"box cells {tuple(cells)} are out of range: three whole numbers >= 1")
 
     counts = [int(c) for c in cells]
+    count = 6.0 * prod(map(float, cells))
+    if count > MOST_TETS:
+        raise InputError(f"box cells {tuple(cells)} make {count:.3g} tets, must be at most {MOST_TETS:.3g}")
     axes = [np.linspace(0.0, length, count + 1) for length, count in zip(size, counts, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])

@@ -1,12 +1,25 @@
 """Scenes: what to simulate, as settings that a file or the command line can change."""
 
 from qlb.scenes.bar import BarScene
+from qlb.scenes.bodies import BodiesScene
 from qlb.scenes.bunny import BunnyScene
 from qlb.scenes.ducks import DucksScene
-from qlb.scenes.files import load_scene, scene_yaml
+from qlb.scenes.files import load_scene
 from qlb.scenes.scene import Scene
+from qlb.scenes.schema import scene_schema
+from qlb.scenes.writing import scene_yaml
 
-SCENES: dict[str, type[Scene]] = {"bar": BarScene, "bunny": BunnyScene, "ducks": DucksScene}
+SCENES: dict[str, type[Scene]] = {"bar": BarScene, "bunny": BunnyScene, "ducks": DucksScene, "bodies": BodiesScene}
 """Every built-in scene by name."""
 
-__all__ = ["SCENES", "BarScene", "BunnyScene", "DucksScene", "Scene", "load_scene", "scene_yaml"]
+__all__ = [
+    "SCENES",
+    "BarScene",
+    "BodiesScene",
+    "BunnyScene",
+    "DucksScene",
+    "Scene",
+    "load_scene",
+    "scene_schema",
+    "scene_yaml",
+]

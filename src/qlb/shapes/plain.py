@@ -66,6 +66,8 @@ def box(size: Sequence[float] = (0.2, 0.2, 0.2), *, tets: int | None = None, edg
         cells = np.maximum(1, np.rint(lengths / positive("box: edge", edge)))
     else:
         cells = _cells(lengths, whole_number("box: tets", given["tets"], 6, 2_000_000))
+    if not np.isfinite(cells).all():
+        raise InputError(f"box: edge {edge} is out of range: too short for lengths {tuple(lengths.tolist())}")
     mesh = TetMesh.box(tuple(lengths), cells=tuple(int(c) for c in cells))  # type: ignore[arg-type]
     return TetMesh(mesh.positions - 0.5 * lengths, mesh.tets)
 

@@ -50,6 +50,8 @@ def run_scene(
         InputError: the scene cannot be built, or the directory cannot be used.
     """
     simulation = scene.build()
+    with scene.located():
+        _ = simulation.system  # what only shows when everything is there
     writer = RunWriter(
         directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite, **scene.output.model_dump()
     )
