@@ -12,6 +12,7 @@ import numpy as np
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError, MissingExtra
+from qlb.export.foot import Foot
 from qlb.export.format import Format
 from qlb.export.recording import Recording
 from qlb.results import Frame
@@ -19,12 +20,12 @@ from qlb.results.files import replacing
 from qlb.results.rendering import Camera, Image, import_pyvista, open_plotter, photograph
 from qlb.results.scenery import Scenery
 from qlb.results.shown import ShownBodies
-from qlb.results.style import INK
 
 TURN_FRAMES = 120
 """Images of a turn around one frame of a run."""
 _MARGIN = 1.08
-_MOST_NAMES = 8
+_FOOT = 0.11
+"""Part of the height that time and colours take."""
 
 
 def write_mp4(
@@ -127,41 +128,24 @@ class _Film:
 
     def images(self) -> Iterator[Image]:
         """Each image, shape (height, width, 3)."""
-        width, height = self.size
-        pixels = max(self._camera.extent[1], self._camera.extent[0] * height / width) * _MARGIN
+        foot = Foot(self._bodies, self._largest, (self.size[0], int(_FOOT * self.size[1])))
+        width, height = self.size[0], self.size[1] - foot.height
+        high = max(self._camera.extent[1], self._camera.extent[0] * height / width) * _MARGIN
         shots = TURN_FRAMES if self._turntable and len(self._recording.steps) == 1 else 1
         total, shot = shots * len(self._recording.steps), 0
-        with open_plotter(self._pyvista, self.size) as plotter:
+        with open_plotter(self._pyvista, (width, height)) as plotter:
             for frame in self._recording.frames():
                 for _ in range(shots):
                     camera = self._camera.turned(2 * np.pi * shot / total) if self._turntable else self._camera
-                    camera.aim(plotter, pixels)
+                    camera.aim(plotter, high)
                     self._show(plotter, frame, camera)
-                    if shot == 0:
-                        self._add_legend(plotter)
                     shot += 1
-                    yield photograph(plotter)
+                    yield np.concatenate([photograph(plotter), foot.at(frame.time)])
 
     def _show(self, plotter: Any, frame: Frame, camera: Camera) -> None:
         scenery = Scenery.of(self._recording.run, [frame])
         scenery.show(plotter, self._pyvista, 0, self._box, camera.direction)
         self._bodies.add(plotter, self._pyvista, self._bodies.at(frame), self._largest)
-        text = f"t = {frame.time:.3f} s"
-        size = max(6, self.size[1] // 60)
-        plotter.add_text(text, position="upper_left", font_size=size, color=INK, name="time")
-
-    def _add_legend(self, plotter: Any) -> None:
-        """A colour bar for the displacement of one body; the names of several, where they have any."""
-        names, colours = self._bodies.names, self._bodies.colours
-        if len(names) == 1:
-            size = {"title_font_size": self.size[1] // 22, "label_font_size": self.size[1] // 24, "n_labels": 3}
-            place = {"position_x": 0.35, "position_y": 0.03, "width": 0.3, "height": 0.07}
-            plotter.add_scalar_bar("displacement [m]", color=INK, fmt="%.3g", **size, **place)
-            return
-        named = [[name, colour] for name, colour in zip(names, colours, strict=True) if name][:_MOST_NAMES]
-        if named:
-            share = 0.04 * len(named)
-            plotter.add_legend(named, bcolor=None, face="rectangle", loc="lower right", size=(0.16, share))
 
 
 def _ffmpeg() -> str:
