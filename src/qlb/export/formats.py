@@ -83,7 +83,8 @@ def export_run(
     given = {name: value for name, value in options.items() if value is not None}
     for name in given:
         if name not in chosen.options:
-            raise InputError(f"format {chosen.name} has no option '{name}', only {', '.join(chosen.options) or 'none'}")
+            takes = f"only {', '.join(chosen.options)}" if chosen.options else "it takes none"
+            raise InputError(f"format {chosen.name} has no option '{name}', {takes}")
     done = 0
 
     def count() -> None:

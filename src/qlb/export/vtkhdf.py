@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from qlb.errors import MissingExtra
+from qlb.export.forgiving_file import ForgivingFile
 from qlb.export.format import Format
 from qlb.export.grids import Data, Grid, grids
 from qlb.export.recording import Recording
@@ -38,12 +39,10 @@ def write_vtkhdf(recording: Recording, path: Path, *, volume: bool = True) -> li
     for grid in grids(recording, volume=volume):
         target = path if not files else surroundings(path)
         files.append(target)
-        with replacing(target) as temporary:
-            try:
-                with h5py.File(temporary, "w") as file:
-                    _write(h5py, file.create_group("VTKHDF"), grid, recording)
-            except RuntimeError as error:  # how HDF5 says that it could not close a file
-                raise OSError(" ".join(str(error).split())) from None
+        with replacing(target) as temporary, ForgivingFile(temporary) as file:
+            with h5py.File(file, "w") as document:
+                _write(h5py, document.create_group("VTKHDF"), grid, recording, file)
+            file.check()
     return files
 
 
@@ -52,7 +51,7 @@ def surroundings(path: Path) -> Path:
     return path.with_name(f"{path.stem}-surroundings{path.suffix}")
 
 
-def _write(h5py: ModuleType, root: Any, grid: Grid, recording: Recording) -> None:
+def _write(h5py: ModuleType, root: Any, grid: Grid, recording: Recording, file: ForgivingFile) -> None:
     """The layout is that of https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format ."""
     kind = b"UnstructuredGrid"
     root.attrs["Version"] = np.array(_VERSION, np.int64)
@@ -70,6 +69,7 @@ def _write(h5py: ModuleType, root: Any, grid: Grid, recording: Recording) -> Non
     frames = recording.read() if grid.name == "surroundings" else recording.frames()
     for k, frame in enumerate(frames):
         times[k] = frame.time
+        file.check()
         if k > 0 and not grid.moves:
             continue
         sample = grid.at(frame)
