@@ -140,6 +140,28 @@ def test_trimesh_and_pygltflib_load_it(run, tmp_path):
     assert len(loaded.binary_blob()) == loaded.buffers[0].byteLength
 
 
+def test_vtk_plays_it(bar, tmp_path):
+    pytest.importorskip("vtk")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOGeometry import vtkGLTFReader
+
+    (path,) = write_glb(Recording.of(bar), tmp_path / "bar.glb")
+    reader = vtkGLTFReader()
+    reader.SetFileName(str(path))
+    reader.SetApplyDeformationsToGeometry(True)
+    reader.SetFrameRate(100)
+    reader.UpdateInformation()
+    assert reader.GetNumberOfAnimations() == 1
+    reader.EnableAnimation(0)
+    for frame in bar.frames():
+        reader.UpdateTimeStep(frame.time)
+        block = reader.GetOutputDataObject(0)
+        while block.IsA("vtkMultiBlockDataSet"):
+            block = block.GetBlock(0)
+        x = vtk_to_numpy(block.GetPoints().GetData())
+        np.testing.assert_allclose(x, body_points(bar, frame, 0), rtol=0, atol=2e-7)
+
+
 def test_a_single_frame_has_no_animation(bar, tmp_path):
     document, binary = parts(write_glb(Recording.of(bar, "2"), tmp_path / "bar.glb")[0])
     assert "animations" not in document
