@@ -40,6 +40,7 @@ StepsOption = Annotated[int | None, typer.Option(help="Number of time steps")]
 IntegratorOption = Annotated[str | None, typer.Option(help=" | ".join(INTEGRATORS))]
 SolverOption = Annotated[str | None, typer.Option(help=" | ".join(SOLVERS))]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; all that the process may use by default")]
+EXPORT_FORMATS = ("vtkhdf", "vtu", "usd", "glb", "obj", "ply", "mp4", "gif")
 OutOption = Annotated[Path | None, typer.Option(help="Where to write; by default the next free runs/NAME-001")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in the output folder")]
 PictureOption = Annotated[bool, typer.Option(help="Render the picture of chosen frames")]
@@ -197,6 +198,25 @@ def report(directory: Annotated[Path, typer.Argument(help="A run directory")]) -
 
     summary = Run(directory).summary
     print_outcome(summary, finish_run(directory))
+
+
+@app.command()
+def export(
+    directory: Annotated[Path, typer.Argument(help="A run directory")],
+    format_: Annotated[str | None, typer.Option("--format", help=" | ".join(EXPORT_FORMATS))] = None,
+    out: Annotated[Path | None, typer.Option(help="A file or a folder; DIRECTORY/exports by default")] = None,
+    steps: Annotated[str, typer.Option(metavar="A:B:C", help="Every C-th frame of steps A to B; or one step")] = "",
+    volume: Annotated[bool | None, typer.Option("--volume/--surface", help="vtkhdf, vtu: tets or surface")] = None,
+    turntable: Annotated[bool | None, typer.Option("--turntable", help="mp4, gif: go around once")] = None,
+    fps: Annotated[float | None, typer.Option(help="mp4, gif: images a second")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="mp4, gif: pixels, such as 1280x720")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier export")] = False,
+) -> None:
+    """Write a run for ParaView, Blender, Houdini, browsers or as a video."""
+    from qlb.cli.export import export_directory
+
+    options = {"volume": volume, "turntable": turntable, "fps": fps, "size": size}
+    export_directory(directory, out, format_, steps, overwrite=overwrite, options=options)
 
 
 @app.command()
