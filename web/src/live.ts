@@ -1,0 +1,58 @@
+// Asks the server of a run for what is new, for as long as there may be more.
+
+import type { Animation } from "./animation";
+import { NEW_CHARTS, type Update } from "./data";
+
+/** Between two questions [s], and how much longer the pause is than the server's work. */
+const SHORTEST_PAUSE = 0.5;
+const REST = 10;
+
+export function follow(animation: Animation, framesChanged: () => void): void {
+  let seconds = 0;
+  let after = animation.frames[animation.frames.length - 1].step;
+
+  const ask = async () => {
+    let update: Update;
+    try {
+      const answer = await fetch(`/update?after=${after}`);
+      update = (await answer.json()) as Update;
+    } catch {
+      headline(
+        "warn",
+        "The server has ended.",
+        "What is shown here stays; the run's folder holds the report.",
+      );
+      return;
+    }
+    seconds = update.seconds;
+    if (update.chunk) {
+      after = update.chunk.steps[update.chunk.steps.length - 1];
+      await animation.add(update.chunk);
+    }
+    animation.head.failedSteps = update.failedSteps;
+    if (update.chunk) framesChanged();
+    if (update.charts) document.dispatchEvent(new CustomEvent(NEW_CHARTS, { detail: update.charts }));
+    headline(update.level, update.headline, "");
+    showFacts(update.facts);
+    if (update.status !== "running" && !update.more) return;
+    window.setTimeout(ask, update.more ? 0 : 1000 * Math.max(SHORTEST_PAUSE, REST * seconds));
+  };
+  void ask();
+}
+
+function headline(level: string, text: string, detail: string): void {
+  const verdict = document.querySelector(".verdict");
+  if (!verdict) return;
+  verdict.className = `verdict ${level}`;
+  const strong = document.createElement("strong");
+  strong.textContent = text;
+  verdict.replaceChildren(strong, ` ${detail}`);
+}
+
+function showFacts(facts: Record<string, string>): void {
+  for (const fact of document.querySelectorAll(".facts li")) {
+    const value = facts[fact.querySelector("span")?.textContent ?? ""];
+    const shown = fact.querySelector("b");
+    if (value !== undefined && shown) shown.textContent = value;
+  }
+}
