@@ -112,6 +112,7 @@ class Simulation:
         self._held = HeldNodes(len(self.assembly.system_mesh.positions))
         self._energies: list[Energy] = []
         self._steps_done = 0
+        self._contact_now: ContactReport | None = None
         self._state = self._initial_state()
         self._system: System | None = None
         self._solver: Descent | None = None
@@ -199,6 +200,11 @@ class Simulation:
         return self._steps_done
 
     @property
+    def contact_now(self) -> ContactReport | None:
+        """Contact at the end of the last step; None before the first, and where nothing can touch."""
+        return self._contact_now
+
+    @property
     def system(self) -> System:
         """The mechanical system; made when first asked for."""
         if self._system is None:
@@ -234,7 +240,7 @@ class Simulation:
         for name, values in (("positions", state.positions), ("velocities", state.velocities)):
             _require(f"shape of {name}", np.shape(values), str(shape), np.shape(values) == shape)
             vectors(name, values, shape)
-        self._state, self._steps_done = state, steps_done
+        self._state, self._steps_done, self._contact_now = state, steps_done, None
         self.solver.load(solver)
 
     def run(self, steps: int) -> Iterator[StepResult]:
@@ -262,6 +268,7 @@ class Simulation:
         self._check_contact(result)
         last = self._state
         self._state = replace(state, time=last.time + self.step, previous=last.without_history())
+        self._contact_now = result.contact
         self._steps_done = step
         return result
 
@@ -269,7 +276,9 @@ class Simulation:
         point, forces = solve.contact, solve.forces
         if point is None or forces is None:
             return None
-        return ContactReport(forces.nodes, point.count, point.minimum_distance, forces.planes, self.assembly)
+        return ContactReport(
+            forces.nodes, point.count, point.minimum_distance, forces.planes, forces.energy, self.assembly
+        )
 
     def _check_contact(self, result: StepResult) -> None:
         """Raise `StepFailed` where the settings of contact ask for a check, and something passes through something."""

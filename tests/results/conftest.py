@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import qlb
-from qlb.results import RenderingFailed, Run, RunWriter, picture
+from qlb.results import RenderingFailed, Run, RunWriter, rendering
 
 SCENE = {"scene": "bar", "material": {"young": 2e4, "poisson": 0.49}, "mesh": {"cells": [4, 1, 1]}, "steps": 3}
 
@@ -48,6 +48,6 @@ def make_run(tmp_path: Path, make_simulation: MakeSimulation) -> MakeRun:
 def can_render() -> None:
     pytest.importorskip("pyvista")
     try:
-        picture._window_class()
+        rendering.window_class()
     except RenderingFailed as error:
         pytest.skip(str(error))

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import qlb
-from qlb.results import MissingExtra, RenderingFailed, picture, render_frames
+from qlb.results import MissingExtra, RenderingFailed, picture, render_frames, rendering
 
 
 @pytest.mark.usefixtures("can_render")
@@ -45,9 +45,9 @@ def test_without_pyvista(make_run, tmp_path, monkeypatch):
 def test_without_opengl_an_error_is_raised_not_a_crash(make_run, tmp_path, monkeypatch):
     pytest.importorskip("pyvista")
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
-    picture._window_class.cache_clear()
+    rendering.window_class.cache_clear()
     try:
-        picture._window_class()
+        rendering.window_class()
     except RenderingFailed:
         with pytest.raises(RenderingFailed, match="VTK found no OpenGL") as caught:
             render_frames(make_run(), tmp_path / "picture.png")
@@ -55,7 +55,7 @@ def test_without_opengl_an_error_is_raised_not_a_crash(make_run, tmp_path, monke
     else:
         pytest.skip("OSMesa is installed here")
     finally:
-        picture._window_class.cache_clear()
+        rendering.window_class.cache_clear()
 
 
 @pytest.mark.parametrize(

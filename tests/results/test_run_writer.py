@@ -263,5 +263,5 @@ def test_the_summary_is_strict_json(make_run):
 def test_nothing_else_lies_in_a_run_directory(make_run):
     run = make_run(steps=1)
     names = {path.relative_to(run.directory) for path in run.directory.rglob("*") if path.is_file()}
-    files = ["run.json", "scene.yaml", "mesh.npz", "stats.csv", "checkpoint.npz", "summary.json"]
+    files = ["run.json", "scene.yaml", "mesh.npz", "materials.npz", "stats.csv", "checkpoint.npz", "summary.json"]
     assert names == {*map(Path, files), Path("frames/000000.npz"), Path("frames/000001.npz")}

@@ -65,7 +65,7 @@ def test_a_run_of_one_body_alone_has_the_arrays_that_it_needs(make_run):
     with np.load(run.directory / "mesh.npz") as arrays:
         assert sorted(arrays) == ["positions", "tets"]
     with np.load(run.directory / "frames" / "000001.npz") as arrays:
-        assert sorted(arrays) == ["positions", "step", "time", "velocities"]
+        assert sorted(arrays) == ["gravity", "positions", "step", "time", "velocities"]
     assert run.parts.nodes == len(run.mesh.positions)
     assert run.parts.body_names == ("",)
     assert run.frame(1).plane_points.shape == (0, 3)

@@ -19,6 +19,8 @@ class ContactForces:
     """on each node, also where it is held [N], shape (n + q, 3)"""
     planes: FloatArray
     """total on each plane [N], shape (p, 3)"""
+    energy: float
+    """of the barrier or penalty, without friction [J]"""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class ContactReport:
     """between surfaces that touch [m]; infinite where nothing does"""
     plane_forces: FloatArray
     """total on each plane [N], shape (p, 3)"""
+    energy: float
+    """of the barrier or penalty, without friction [J]"""
     _assembly: Assembly = field(repr=False)
 
     def on(self, which: int | str | Body | Obstacle | Plane) -> FloatArray:

@@ -141,7 +141,7 @@ class StageContact:
                 gradient = np.zeros_like(x)
                 self._slide(friction, x, gradient)
                 total += gradient.sum(axis=0)
-        return ContactForces(-point.gradient / scale, planes / scale)
+        return ContactForces(-point.gradient / scale, planes / scale, contacts.energy / scale)
 
     def _slide(self, friction: _native.Friction, x: FloatArray, gradient: FloatArray) -> _native.FrictionTerms:
         epsilon = self.model.friction_velocity * self._stage.c

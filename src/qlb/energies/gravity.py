@@ -23,8 +23,12 @@ class Gravity:
 
     def forces(self, time: float) -> FloatArray:
         """Forces on the nodes [N] at `time` [s], shape (n, 3)."""
+        return self._mass[:, None] * self.acceleration(time)
+
+    def acceleration(self, time: float) -> FloatArray:
+        """[m/s^2] at `time` [s], shape (3,)."""
         a = self._acceleration(time) if callable(self._acceleration) else self._acceleration
-        return self._mass[:, None] * vectors("gravity", a, (3,))
+        return vectors("gravity", a, (3,))
 
     def at(self, stage: Stage, guess: FloatArray) -> DeadLoad:
         """A dead load at the stage's time."""

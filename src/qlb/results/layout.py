@@ -9,10 +9,13 @@ Format version 1::
                         obstacle_triangles (t, 3); where bodies are shown by surfaces of their own, surface_triangles,
                         surface_tets, surface_weights (`EmbeddedSurface`); planes (p, 6), a point [m] and the normal
                         of each
+    materials.npz       what the tets are made of (`qlb.analysis.Constitution`): kernels (l,), tets (l, 2), the first
+                        and the first behind of each, parameters_0, ... of the kernels, density [kg/m^3] (1 or m,), mass
     frames/000000.npz   step, time [s], positions [m] (n + q, 3), velocities [m/s] (n + q, 3), those of obstacles last;
                         plane_points [m] (p, 3) where there are planes; with contact, but for the first frame of a
                         run, contact_forces on each node [N] (n + q, 3) and the total on each plane, plane_forces [N]
-                        (p, 3); named by the step
+                        (p, 3), and contact_energy [J]; gravity [m/s^2] (3,); load_energy [J] where there are loads;
+                        named by the step
     stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
     checkpoint.npz      what a run needs to go on to the same bits, as of the last frame
     summary.json        the run in numbers; its status is "running" until the end
@@ -40,6 +43,7 @@ VERSION = 1
 MARKER = "run.json"
 SCENE = "scene.yaml"
 MESH = "mesh.npz"
+MATERIALS = "materials.npz"
 FRAMES = "frames"
 STATS = "stats.csv"
 CHECKPOINT = "checkpoint.npz"
@@ -135,7 +139,7 @@ def _clear(directory: Path) -> None:
 
 def _files(directory: Path) -> Iterator[Path]:
     yield from (frame_path(directory, step) for step in frame_steps(directory))
-    names = (SCENE, MESH, STATS, CHECKPOINT, SUMMARY, REPORT, *FIGURES.values())
+    names = (SCENE, MESH, MATERIALS, STATS, CHECKPOINT, SUMMARY, REPORT, *FIGURES.values())
     yield from (directory / name for name in names)
 
 

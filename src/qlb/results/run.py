@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from qlb.analysis import Constitution, Snapshot
 from qlb.arrays import BoolArray, FloatArray, LongArray
 from qlb.errors import InputError
 from qlb.integrators import State
@@ -40,6 +41,12 @@ class Frame:
     """of contact and friction on each node [N], shape (n + q, 3), where there is contact and a step has been taken"""
     plane_forces: FloatArray | None = None
     """their total on each plane [N], shape (p, 3)"""
+    gravity: FloatArray | None = None
+    """acceleration [m/s^2], shape (3,); None in a run of an earlier version of qlb"""
+    contact_energy: float = 0.0
+    """of the barrier or penalty [J]"""
+    load_energy: float = 0.0
+    """of loads and energies that were added [J]"""
 
 
 class StepIterations(NamedTuple):
@@ -109,10 +116,10 @@ class Run:
         shapes |= {"plane_points": (planes, 3)} if planes else {}
         arrays = read_arrays(path, shapes)
         forces = arrays.get("contact_forces")
-        if forces is not None:
-            require_shapes(
-                path, arrays, {"contact_forces": (nodes, 3)} | ({"plane_forces": (planes, 3)} if planes else {})
-            )
+        given = {"contact_forces": (nodes, 3), "gravity": (3,), "contact_energy": (), "load_energy": ()}
+        needed = {name: shape for name, shape in given.items() if name in arrays}
+        needed |= {"plane_forces": (planes, 3)} if planes and forces is not None else {}
+        require_shapes(path, arrays, needed)
         nothing = np.empty((0, 3))
         return Frame(
             int(arrays["step"]),
@@ -122,11 +129,40 @@ class Run:
             arrays.get("plane_points", nothing),
             forces,
             None if forces is None else arrays.get("plane_forces", nothing),
+            arrays.get("gravity"),
+            float(arrays.get("contact_energy", 0.0)),
+            float(arrays.get("load_energy", 0.0)),
         )
 
     def frames(self) -> Iterator[Frame]:
         """Every frame in order, read one by one."""
         return map(self.frame, self.frame_steps)
+
+    @cached_property
+    def constitution(self) -> Constitution:
+        """Materials, density and mass of the bodies."""
+        path = self.directory / layout.MATERIALS
+        if not path.exists():
+            raise InputError(f"{path} does not exist: the run was written by an earlier version of qlb; run it again")
+        arrays = read_arrays(path, {"kernels": (None,), "tets": (None, 2), "density": (None,), "mass": ()})
+        try:
+            return Constitution.from_arrays(self.mesh, arrays)
+        except InputError as error:
+            raise InputError(f"{path} is not what it should be: {error}") from None
+
+    def snapshot(self, which: int | Frame) -> Snapshot:
+        """Strain, stress, energies and momentum in a frame, given itself or its step."""
+        frame = which if isinstance(which, Frame) else self.frame(which)
+        return Snapshot(
+            self.constitution,
+            frame.time,
+            frame.positions,
+            frame.velocities,
+            np.zeros_like(frame.positions) if frame.contact_forces is None else frame.contact_forces,
+            frame.gravity,
+            frame.contact_energy,
+            frame.load_energy,
+        )
 
     @cached_property
     def stages(self) -> int:

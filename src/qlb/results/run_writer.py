@@ -15,13 +15,15 @@ import numpy as np
 import yaml
 
 from qlb import _native
+from qlb.analysis import Constitution
+from qlb.analysis.snapshot import load_energy
 from qlb.contact import ContactReport
 from qlb.errors import InputError
 from qlb.results import layout
 from qlb.results.checkpoint import Checkpoint
 from qlb.results.clock import LoopClock
 from qlb.results.errors import WriteError
-from qlb.results.files import append_text, write_arrays, write_text
+from qlb.results.files import Arrays, append_text, write_arrays, write_text
 from qlb.results.parts import Parts
 from qlb.results.statistics import HEADER, StepCount, csv_rows, summarise
 from qlb.simulation import Simulation
@@ -78,6 +80,7 @@ class RunWriter:
         layout.claim(self.directory, overwrite=overwrite)
         write_text(self.directory / layout.SCENE, text)
         write_arrays(self.directory / layout.MESH, Parts.of(simulation.assembly).arrays())
+        write_arrays(self.directory / layout.MATERIALS, Constitution.of(simulation).arrays())
         append_text(self.directory / layout.STATS, HEADER)
         self._keep()
         self._clock = LoopClock(simulation.timer)
@@ -150,11 +153,15 @@ class RunWriter:
     def _keep(self) -> None:
         """Write the frame, then the checkpoint that makes it count."""
         state, step = self._now.state, self._now.steps_done
-        frame = {"positions": state.positions, "velocities": state.velocities}
+        system = self._simulation.system
+        frame: Arrays = {"positions": state.positions, "velocities": state.velocities}
+        frame["gravity"] = system.gravity.acceleration(state.time)
+        if system.added:
+            frame["load_energy"] = np.array(load_energy(system, state, self._simulation.step))
         if planes := self._simulation.assembly.planes:
             frame["plane_points"] = np.stack([plane.point_at(state.time) for plane in planes])
         if self._contact is not None:
-            frame["contact_forces"] = self._contact.forces
+            frame["contact_forces"], frame["contact_energy"] = self._contact.forces, np.array(self._contact.energy)
             frame |= {"plane_forces": self._contact.plane_forces} if planes else {}
         write_arrays(
             layout.frame_path(self.directory, step), {"step": np.int64(step), "time": np.float64(state.time), **frame}
