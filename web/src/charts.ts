@@ -1,6 +1,6 @@
-// What plots show: traces and axes for plotly.
+// What the plots of a run show: traces and axes for plotly.
 
-import type { Charts, Curve, History } from "./data";
+import type { Charts, Curve } from "./data";
 import { base64Bytes } from "./packing";
 import { short } from "./units";
 
@@ -21,12 +21,12 @@ export interface Plot {
 }
 
 const BLUE = "#2b8fd0";
-const RED = "#d0453c";
+export const RED = "#d0453c";
 const FACTOR = "#E69F00";
-const CURVES = [BLUE, RED, "#009E73", "#CC79A7", "#E69F00", "#8C510A"];
+export const CURVES = [BLUE, RED, "#009E73", "#CC79A7", "#E69F00", "#8C510A"];
 const HOVER_STEP = "step %{x}: %{y}<extra>%{fullData.name}</extra>";
 
-function plot(own: Partial<Plot> & Pick<Plot, "id" | "title" | "traces" | "axes">): Plot {
+export function plot(own: Partial<Plot> & Pick<Plot, "id" | "title" | "traces" | "axes">): Plot {
   return { note: "", height: 380, wide: false, legend: true, overSteps: true, layout: {}, ...own };
 }
 
@@ -36,7 +36,6 @@ export function ofOneRun(charts: Charts, palette: string): Plot[] {
     residuals(charts, palette),
     seconds(charts),
     ...(charts.contact ? [contact(charts.contact)] : []),
-    ...charts.histories.map(history),
   ];
 }
 
@@ -46,7 +45,7 @@ function counts(values: number[]): Settings {
   return most <= 6 ? { dtick: 1, rangemode: "tozero" } : { rangemode: "tozero" };
 }
 
-function steps(curve: { steps: number[]; values: (number | null)[] }, own: Settings): Settings {
+export function steps(curve: { steps: number[]; values: (number | null)[] }, own: Settings): Settings {
   const few = curve.steps.length < 3;
   return {
     type: "scatter",
@@ -59,7 +58,7 @@ function steps(curve: { steps: number[]; values: (number | null)[] }, own: Setti
   };
 }
 
-function meanAndMax(curve: Curve): string {
+export function meanAndMax(curve: Curve): string {
   const { values } = curve;
   if (values.length === 0) return "no steps";
   const mean = values.reduce((a, b) => a + b, 0) / values.length;
@@ -103,7 +102,7 @@ function iterations(charts: Charts): Plot {
 }
 
 /** Crosses at steps that did not converge, on the first curve. */
-function failures(charts: Charts): Settings[] {
+export function failures(charts: Charts): Settings[] {
   if (charts.failedSteps.length === 0) return [];
   const all = charts.iterations;
   const most = (step: number) => Math.max(...all.map((c) => c.values[c.steps.indexOf(step)] ?? 0));
@@ -280,95 +279,6 @@ function contact(data: NonNullable<Charts["contact"]>): Plot {
     },
     layout: { shapes: [shape] },
   });
-}
-
-function history(data: History): Plot {
-  const traces = data.curves.map((curve, k) => ({
-    type: "scatter",
-    mode: data.times.length < 3 ? "lines+markers" : "lines",
-    name: curve.name,
-    x: data.times,
-    y: curve.values,
-    line: { color: CURVES[k % CURVES.length], width: 1.8 },
-    hovertemplate: `t = %{x:.4g} s: %{y:.4g}<extra>${curve.name}</extra>`,
-  }));
-  return plot({
-    id: data.id,
-    title: data.title,
-    overSteps: false,
-    traces,
-    axes: { xaxis: { title: "time [s]" }, yaxis: { title: data.axis, exponentformat: "power" } },
-  });
-}
-
-/** Of each run one curve. */
-export function compared(runs: { label: string; charts: Charts }[]): Plot[] {
-  const curves = runs.flatMap(({ label, charts }, k) =>
-    charts.iterations.map((curve, stage) =>
-      steps(curve, {
-        name: `${label}${charts.iterations.length > 1 ? `, ${curve.name}` : ""}: ${meanAndMax(curve)}`,
-        line: { color: CURVES[k % CURVES.length], dash: stage === 0 ? "solid" : "dot" },
-        hovertemplate: `step %{x}: %{y} iterations<extra>${label}</extra>`,
-      }),
-    ),
-  );
-  const crosses = runs
-    .flatMap(({ charts }) => failures(charts))
-    .map((trace, k) => ({ ...trace, showlegend: k === 0 }));
-  return [
-    plot({
-      id: "iterations",
-      title: "Nonlinear iterations",
-      wide: true,
-      height: 360,
-      traces: [...curves, ...crosses],
-      axes: { xaxis: { title: "time step" }, yaxis: iterationAxis(runs.map(({ charts }) => charts)) },
-    }),
-    overSteps(runs, "seconds", "Time so far", "wall clock [s]", ({ seconds: data }) =>
-      running(data.steps.map((_, k) => data.parts.reduce((sum, part) => sum + part.values[k], 0))),
-    ),
-    overSteps(runs, "factorizations", "Factorizations so far", "factorizations", (charts) =>
-      running(charts.factorizations.values),
-    ),
-  ];
-}
-
-function overSteps(
-  runs: { label: string; charts: Charts }[],
-  id: string,
-  title: string,
-  axis: string,
-  values: (charts: Charts) => number[],
-): Plot {
-  const traces = runs.map(({ label, charts }, k) =>
-    steps(
-      { steps: charts.factorizations.steps, values: values(charts) },
-      { name: label, line: { shape: "linear", color: CURVES[k % CURVES.length], width: 2 } },
-    ),
-  );
-  return plot({
-    id,
-    title,
-    traces,
-    axes: { xaxis: { title: "time step" }, yaxis: { title: axis, rangemode: "tozero" } },
-  });
-}
-
-/** Logarithmic where means are far apart, as in plots of src/qlb/results/plots.py. */
-function iterationAxis(charts: Charts[]): Settings {
-  const means = charts.map(({ iterations: [curve] }) =>
-    Math.max(1, curve.values.reduce((a, b) => a + b, 0) / (curve.values.length || 1)),
-  );
-  const far = Math.max(...means) > 12 * Math.min(...means);
-  return {
-    title: "iterations",
-    ...(far ? { type: "log", exponentformat: "power", dtick: 1 } : { rangemode: "tozero" }),
-  };
-}
-
-function running(values: number[]): number[] {
-  let sum = 0;
-  return values.map((value) => (sum += value));
 }
 
 function paletteColours(palette: string, count: number): string[] {

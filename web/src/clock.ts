@@ -7,7 +7,8 @@ const LONGEST = 20;
 
 export class Clock {
   time = 0;
-  speed = 1;
+  speed: number;
+  private speedChosen = false;
   playing = false;
   private before = 0;
 
@@ -35,8 +36,14 @@ export class Clock {
   setTimes(times: number[]): void {
     const atEnd = !this.playing && this.index === this.times.length - 1;
     this.times = times;
+    if (!this.speedChosen) this.speed = this.sensibleSpeed();
     if (atEnd) this.goTo(times.length - 1);
     else this.changed();
+  }
+
+  chooseSpeed(speed: number): void {
+    this.speed = speed;
+    this.speedChosen = true;
   }
 
   goTo(index: number): void {

@@ -42,6 +42,8 @@ export interface Chunk {
   /** in the order of `Head.fields`, without the displacement */
   fields: (Quantised & { name: string; largest: number })[];
   obstacles: (Quantised<number[]> & { frames: number }) | null;
+  /** where it is known */
+  history: History | null;
   /** of each frame, a point on each plane */
   planePoints: number[][][];
 }
@@ -72,18 +74,17 @@ export interface Charts {
     parts: { name: string; colour: string; total: number; values: number[] }[];
   };
   contact: { steps: number[]; contacts: number[]; gaps: (number | null)[]; dhat: number } | null;
-  /** curves over the time of frames, grouped by plot */
-  histories: History[];
   failedSteps: number[];
 }
 
+/** Of each frame of a chunk. */
 export interface History {
-  id: string;
-  title: string;
-  /** with its unit */
-  axis: string;
-  times: number[];
-  curves: { name: string; values: (number | null)[] }[];
+  /** by kind, and their total [J] */
+  energies: Record<string, number[]>;
+  /** [kg m/s] */
+  momentum: number[][];
+  /** about the origin [kg m^2/s] */
+  angularMomentum: number[][];
 }
 
 export interface PageData {
@@ -102,14 +103,13 @@ export interface Update {
   status: string;
   /** how the run is going, in a line */
   headline: string;
+  detail: string;
   /** like a verdict's: good, bad or warn */
   level: string;
   facts: Record<string, string>;
   chunk: Chunk | null;
-  charts: Charts | null;
+  charts: Charts;
   failedSteps: number[];
-  /** whether there is more to ask for at once */
-  more: boolean;
   /** that the server needed */
   seconds: number;
 }
@@ -117,6 +117,7 @@ export interface Update {
 /** Names of events on `document` by which the scripts of a page talk to each other. */
 export const SHOW_STEP = "qlb:step";
 export const NEW_CHARTS = "qlb:charts";
+export const NEW_FRAMES = "qlb:frames";
 
 export function pageData(): PageData {
   const element = document.getElementById("qlb-data");

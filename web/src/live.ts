@@ -1,21 +1,20 @@
 // Asks the server of a run for what is new, for as long as there may be more.
 
 import type { Animation } from "./animation";
-import { NEW_CHARTS, type Update } from "./data";
+import { NEW_CHARTS, NEW_FRAMES, type Update } from "./data";
 
-/** Between two questions [s], and how much longer the pause is than the server's work. */
+/** Between two questions [s], and how much longer the pause is than what the server needs of a core. */
 const SHORTEST_PAUSE = 0.5;
 const REST = 10;
 
 export function follow(animation: Animation, framesChanged: () => void): void {
-  let seconds = 0;
   let after = animation.frames[animation.frames.length - 1].step;
 
   const ask = async () => {
-    let update: Update;
+    let update: Update | null;
     try {
       const answer = await fetch(`/update?after=${after}`);
-      update = (await answer.json()) as Update;
+      update = answer.ok ? ((await answer.json()) as Update) : null;
     } catch {
       headline(
         "warn",
@@ -24,18 +23,22 @@ export function follow(animation: Animation, framesChanged: () => void): void {
       );
       return;
     }
-    seconds = update.seconds;
+    if (!update) {
+      window.setTimeout(ask, 1000 * SHORTEST_PAUSE);
+      return;
+    }
+    animation.head.failedSteps = update.failedSteps;
     if (update.chunk) {
       after = update.chunk.steps[update.chunk.steps.length - 1];
       await animation.add(update.chunk);
+      document.dispatchEvent(new CustomEvent(NEW_FRAMES, { detail: update.chunk }));
+      framesChanged();
     }
-    animation.head.failedSteps = update.failedSteps;
-    if (update.chunk) framesChanged();
-    if (update.charts) document.dispatchEvent(new CustomEvent(NEW_CHARTS, { detail: update.charts }));
-    headline(update.level, update.headline, "");
+    document.dispatchEvent(new CustomEvent(NEW_CHARTS, { detail: update.charts }));
+    headline(update.level, update.headline, update.detail);
     showFacts(update.facts);
-    if (update.status !== "running" && !update.more) return;
-    window.setTimeout(ask, update.more ? 0 : 1000 * Math.max(SHORTEST_PAUSE, REST * seconds));
+    if (update.status === "running")
+      window.setTimeout(ask, 1000 * Math.max(SHORTEST_PAUSE, REST * update.seconds));
   };
   void ask();
 }

@@ -2,9 +2,11 @@
 
 import Plotly from "plotly.js-basic-dist-min";
 
-import { compared, ofOneRun, type Plot } from "./charts";
-import { NEW_CHARTS, SHOW_STEP, pageData, type Charts, type PageData } from "./data";
+import { ofOneRun, type Plot } from "./charts";
+import { compared } from "./comparison";
+import { NEW_CHARTS, NEW_FRAMES, SHOW_STEP, pageData, type Charts, type Chunk, type PageData } from "./data";
 import { cssColour, element } from "./dom";
+import { Times } from "./histories";
 
 type Settings = Record<string, unknown>;
 
@@ -12,6 +14,7 @@ const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: [
 
 class Plots {
   private readonly boxes = new Map<string, HTMLElement>();
+  private readonly histories: Times[];
   private runs: { label: string; charts: Charts }[];
 
   constructor(
@@ -19,8 +22,16 @@ class Plots {
     private readonly data: PageData,
   ) {
     this.runs = data.charts;
+    this.histories = data.animations.map(({ label, chunks }) => {
+      const history = new Times(label);
+      for (const chunk of chunks) history.add(chunk);
+      return history;
+    });
     void this.draw().then(() => (root.dataset.ready = "yes"));
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => void this.draw());
+    document.addEventListener(NEW_FRAMES, (event) =>
+      this.histories[0].add((event as CustomEvent<Chunk>).detail),
+    );
     document.addEventListener(NEW_CHARTS, (event) => {
       this.runs = [{ label: this.runs[0].label, charts: (event as CustomEvent<Charts>).detail }];
       void this.draw();
@@ -28,8 +39,13 @@ class Plots {
   }
 
   private async draw(): Promise<void> {
-    const { palette } = this.data;
-    const plots = this.runs.length === 1 ? ofOneRun(this.runs[0].charts, palette) : compared(this.runs);
+    const plots =
+      this.runs.length === 1
+        ? [
+            ...ofOneRun(this.runs[0].charts, this.data.palette),
+            ...this.histories.flatMap((run) => run.plots()),
+          ]
+        : compared(this.runs, this.histories);
     for (const plot of plots) this.makeBox(plot); // all of them first: widths depend on how many there are
     for (const plot of plots) await this.drawOne(plot);
   }

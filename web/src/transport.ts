@@ -26,6 +26,7 @@ export class Transport {
     step: "1",
     "aria-label": "Time step",
   });
+  private readonly speed = element("select", { id: "speed" });
   private readonly marks = element("div", { class: "marks", "aria-hidden": "true" });
   private readonly readout = element("output", { class: "readout" });
   private decimals = 3;
@@ -37,6 +38,8 @@ export class Transport {
     actions: Actions,
     edges: boolean,
   ) {
+    for (const speed of SPEEDS) this.speed.append(element("option", { value: String(speed) }, `${speed}×`));
+    this.speed.addEventListener("change", () => clock.chooseSpeed(Number(this.speed.value)));
     this.play = iconButton("Play", PLAY, "space", () => clock.toggle());
     this.play.classList.add("play");
     const lines = iconButton("Mesh edges", EDGES, "E", () => toggleEdges());
@@ -53,7 +56,7 @@ export class Transport {
       iconButton("One frame on", ON, "right arrow", () => clock.step(1)),
       track,
       this.readout,
-      labelled("Speed", this.speeds()),
+      labelled("Speed", this.speed),
       lines,
       iconButton("Reset view", RESET, "R", actions.reset),
     );
@@ -90,6 +93,7 @@ export class Transport {
     const { index, playing } = this.clock;
     const step = this.steps[index];
     this.slider.value = String(index);
+    this.speed.value = String(this.clock.speed);
     const bad = this.failed.has(step);
     const text = `step ${step}, t = ${time.toFixed(this.decimals)} s`;
     this.slider.setAttribute("aria-valuetext", text);
@@ -100,13 +104,5 @@ export class Transport {
     this.play.setAttribute("aria-label", name);
     this.play.title = `${name} (space)`;
     this.play.innerHTML = icon(playing ? PAUSE : PLAY);
-  }
-
-  private speeds(): HTMLSelectElement {
-    const select = element("select", { id: "speed" });
-    for (const speed of SPEEDS) select.append(element("option", { value: String(speed) }, `${speed}×`));
-    select.value = String(this.clock.speed);
-    select.addEventListener("change", () => (this.clock.speed = Number(select.value)));
-    return select;
   }
 }

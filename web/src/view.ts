@@ -40,13 +40,14 @@ export class View {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly sun = new DirectionalLight(0xffffff, 1.6);
-  private readonly sky = new HemisphereLight(0xffffff, 0xb4bcc6, 2.5);
+  private readonly sun = new DirectionalLight(0xffffff, 1.7);
+  private readonly sky = new HemisphereLight(0xffffff, 0xc4cbd4, 2.8);
   private readonly body: Body;
   private readonly obstacles: Mesh<BufferGeometry, MeshLambertMaterial> | null;
   private readonly planes: Plane[];
   private wanted = false;
   private sized = false;
+  private touched = false;
   private frame: Frame;
 
   constructor(
@@ -71,11 +72,13 @@ export class View {
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableZoom = false; // until it has the focus
     this.controls.addEventListener("change", () => this.redraw());
+    this.controls.addEventListener("start", () => (this.touched = true));
     this.show(this.frame);
   }
 
   /** The camera to where it holds all of the motion. */
   reset(): void {
+    this.touched = false;
     const { centre, radius } = this.extent();
     const distance = this.distance(centre);
     this.camera.position.copy(centre).addScaledVector(LOOK_FROM, distance);
@@ -88,6 +91,11 @@ export class View {
     this.controls.update();
     this.place(centre, radius);
     this.redraw();
+  }
+
+  /** There are more frames: hold them in sight, unless the camera was moved by hand. */
+  framesChanged(): void {
+    if (!this.touched && this.sized) this.reset();
   }
 
   /** From `centre`, at which all points of all frames are in sight. */

@@ -60,6 +60,7 @@ export class Viewer {
       failed,
     );
     this.bar.update();
+    for (const view of this.views) view.framesChanged();
     this.clock.setTimes(times);
   }
 

@@ -115,9 +115,14 @@ def moving_parts(runs: Mapping[str, Run], *, most_bytes: int, live: bool = False
     """Scripts of a page and their data; both are None where the scripts were not built, and a note says so."""
     scripts = page_scripts(("viewer", "plots"))
     if scripts is None:
-        return {"scripts": None, "content": None, "scripts_missing": SCRIPTS_MISSING}
+        return {"scripts": None, "content": None, "scripts_missing": SCRIPTS_MISSING, "live": live}
     room = most_bytes - sum(map(len, scripts))
-    return {"scripts": scripts, "content": page_content(runs, most_bytes=room, live=live), "scripts_missing": None}
+    return {
+        "scripts": scripts,
+        "content": page_content(runs, most_bytes=room, live=live),
+        "scripts_missing": None,
+        "live": live,
+    }
 
 
 def write_comparison(

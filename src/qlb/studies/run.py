@@ -31,6 +31,7 @@ def run_scene(
     directory: Path,
     *,
     overwrite: bool = False,
+    on_start: Callable[[Path], None] = lambda directory: None,
     on_step: Callable[[StepResult], None] = lambda result: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Outcome:
@@ -40,6 +41,7 @@ def run_scene(
         scene: what to run.
         directory: where; made, and refused if it holds anything.
         overwrite: replace an earlier run there.
+        on_start: called with the directory when it holds the first frame.
         on_step: called after each step, the failed one included.
         stop: asked before each step whether to end early.
 
@@ -50,6 +52,7 @@ def run_scene(
     plain, stride = scene.model_dump(mode="json"), scene.output.stride
     try:
         with RunWriter(directory, plain, simulation, overwrite=overwrite, stride=stride) as writer:
+            on_start(directory)
             for _ in range(scene.steps):
                 if stop():
                     writer.finish("interrupted")

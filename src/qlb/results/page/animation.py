@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from qlb.arrays import FloatArray, IntArray
-from qlb.results.page.fields import field_data, nodal_fields
+from qlb.results.page.fields import field_data, history_data, nodal_fields
 from qlb.results.page.packing import pack, positions_data
 from qlb.results.page.thinning import merge_vertices, spread
 from qlb.results.run import Frame, Run
@@ -55,7 +55,7 @@ class Animation:
     def __init__(self, run: Run, *, most_bytes: int = PAGE_BYTES) -> None:
         self._run = run
         self._most_bytes = most_bytes
-        self._fields = nodal_fields(run)
+        self._fields, self._no_stress = nodal_fields(run)
         self._surface = _surface(run, most_bytes // _VERTEX_BYTES)
 
     def head(self) -> dict[str, Any]:
@@ -81,18 +81,19 @@ class Animation:
     def chunk(self, steps: Sequence[int]) -> dict[str, Any]:
         """The frames of `steps`, at least one."""
         frames = [self._run.frame(step) for step in steps]
-        nodes = len(self._run.mesh.positions)
+        snapshots = [self._run.snapshot(frame) for frame in frames]
         surface = self._surface
         scenery = Scenery.of(self._run, frames)
-        bodies = np.stack([surface.of_nodes(frame.positions[:nodes]) for frame in frames])
+        bodies = np.stack([surface.of_nodes(frame.positions) for frame in frames])
         return {
             "steps": list(steps),
             "times": [frame.time for frame in frames],
             "positions": positions_data(bodies),
             "fields": [
-                field_data(field, [surface.of_nodes(field.values(frame)) for frame in frames]) for field in self._fields
+                field_data(field, [surface.of_nodes(field.values(now)) for now in snapshots]) for field in self._fields
             ],
             "obstacles": _obstacles_data(scenery, frames),
+            "history": None if self._no_stress else history_data(snapshots),
             "planePoints": [points.tolist() for points in scenery.points],
         }
 
@@ -118,6 +119,8 @@ class Animation:
         if (now := len(self._surface.nodes)) < self._surface.all_vertices:
             merged = f"{self._surface.all_vertices} vertices of the surface are merged into {now}"
             notes.append(f"To keep the page small {merged}.")
+        if self._no_stress:
+            notes.append(f"Stress, energies and momentum are left out: {self._no_stress}.")
         return " ".join(notes)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from qlb.results import style
+from qlb.results.page.packing import numbers
 from qlb.results.page.thinning import spread
 from qlb.results.plots import residual_lines
 from qlb.results.run import Run
@@ -15,7 +15,6 @@ from qlb.timing import PARTS
 
 _MOST_LINES = 240
 """Solves whose residuals are drawn."""
-_DIGITS = 6
 
 
 def run_charts(run: Run) -> dict[str, Any]:
@@ -26,17 +25,8 @@ def run_charts(run: Run) -> dict[str, Any]:
         "residuals": _residuals(run),
         "seconds": _seconds(run),
         "contact": _contact(run),
-        "histories": [],
         "failedSteps": list(run.summary["failed_steps"]),
     }
-
-
-def numbers(values: npt.ArrayLike) -> list[float | int | None]:
-    """For JSON: short, and null for what is not finite."""
-    array = np.asarray(values)
-    if array.dtype.kind in "iub":
-        return list(array.tolist())
-    return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in array.tolist()]
 
 
 def _iterations(run: Run) -> list[dict[str, Any]]:

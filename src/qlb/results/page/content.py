@@ -14,6 +14,7 @@ from qlb.results.page.animation import Animation
 from qlb.results.page.charts import run_charts
 from qlb.results.page.scripts import page_data
 from qlb.results.run import Run
+from qlb.results.shown import COLOURS
 
 _LEAST_SHARE = 4
 """Animations get at least this part of a page, however long its plots are."""
@@ -53,7 +54,5 @@ def _animation(label: str, run: Run, most_bytes: int, *, live: bool) -> dict[str
 
 def _palette() -> str:
     """The colours of pictures as sRGB bytes (256, 3)."""
-    from qlb.results.picture import COLOURS
-
     colours = np.rint(255 * COLOURS(np.linspace(0, 1, 256))[:, :3]).astype(np.uint8)
     return base64.b64encode(colours.tobytes()).decode("ascii")

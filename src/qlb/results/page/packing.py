@@ -13,6 +13,7 @@ import numpy.typing as npt
 from qlb.arrays import FloatArray
 
 _LEVEL = 6
+_DIGITS = 6
 _UNSIGNED: dict[int, Any] = {1: np.uint8, 2: np.uint16, 4: np.uint32}
 _SIGNED: dict[int, Any] = {1: np.int8, 2: np.int16, 4: np.int32}
 
@@ -61,3 +62,11 @@ def positions_data(positions: FloatArray) -> dict[str, Any]:
         "low": low.tolist(),
         "high": high.tolist(),
     }
+
+
+def numbers(values: npt.ArrayLike) -> list[float | int | None]:
+    """For JSON: short, and null for what is not finite."""
+    array = np.asarray(values)
+    if array.dtype.kind in "iub":
+        return list(array.tolist())
+    return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in array.tolist()]
