@@ -87,7 +87,7 @@ export class Clock {
   }
 
   private sensibleSpeed(): number {
-    const length = (this.times[this.times.length - 1] ?? 0) - this.time;
+    const length = (this.times[this.times.length - 1] ?? 0) - (this.times[0] ?? 0);
     if (length >= SHORTEST && length <= LONGEST) return 1;
     if (length > LONGEST)
       return SPEEDS.find((speed) => length / speed <= LONGEST) ?? SPEEDS[SPEEDS.length - 1];
