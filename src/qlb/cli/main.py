@@ -44,6 +44,8 @@ EXPORT_FORMATS = ("vtkhdf", "vtu", "usd", "glb", "obj", "ply", "mp4", "gif")
 OutOption = Annotated[Path | None, typer.Option(help="Where to write; by default the next free runs/NAME-001")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in the output folder")]
 PictureOption = Annotated[bool, typer.Option(help="Render the picture of chosen frames")]
+LiveOption = Annotated[bool, typer.Option("--live", help="Show the run in a browser as it goes; prints where")]
+RunArgument = Annotated[Path, typer.Argument(help="A run directory")]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="One line per step")]
 
 
@@ -59,16 +61,22 @@ def run(
     overwrite: OverwriteOption = False,
     verbose: VerboseOption = False,
     picture: PictureOption = True,
+    live: LiveOption = False,
 ) -> None:
     """Run a scene; leave frames, statistics, a plot, a picture and a report."""
+    from qlb.cli.live import shown_live
     from qlb.studies import run_scene
 
     changes = {"steps": steps, "solver": solver, "integrator": integrator, "threads": threads}
     settings = load_scene(scene, [*set_, *_overrides(changes)])
     directory = out or _free_directory(scene)
-    with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
-        outcome = run_scene(settings, directory, overwrite=overwrite, on_step=reporter, stop=interrupt)
-    raise typer.Exit(_finish(outcome, picture=picture))
+    with shown_live(live) as on_start:
+        with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
+            outcome = run_scene(
+                settings, directory, overwrite=overwrite, on_start=on_start, on_step=reporter, stop=interrupt
+            )
+        status = _finish(outcome, picture=picture)
+    raise typer.Exit(status)
 
 
 @app.command()
@@ -77,14 +85,18 @@ def resume(
     steps: Annotated[int | None, typer.Option(help="Steps in all; by default as many as the scene says")] = None,
     verbose: VerboseOption = False,
     picture: PictureOption = True,
+    live: LiveOption = False,
 ) -> None:
     """Go on from the last finished step of a run, to the same bits as if it had never been broken off."""
+    from qlb.cli.live import shown_live
     from qlb.studies import resume_run, scene_of
 
     settings = scene_of(directory, steps)
-    with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
-        outcome = resume_run(directory, steps=steps, on_step=reporter, stop=interrupt)
-    raise typer.Exit(_finish(outcome, picture=picture))
+    with shown_live(live) as on_start:
+        with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
+            outcome = resume_run(directory, steps=steps, on_start=on_start, on_step=reporter, stop=interrupt)
+        status = _finish(outcome, picture=picture)
+    raise typer.Exit(status)
 
 
 @app.command()
@@ -192,12 +204,28 @@ def schema() -> None:
 
 
 @app.command()
-def report(directory: Annotated[Path, typer.Argument(help="A run directory")]) -> None:
+def report(
+    directory: RunArgument,
+    megabytes: Annotated[
+        float, typer.Option(help="Size of the page at most, about; frames and vertices are thinned out", min=3.0)
+    ] = 15.0,
+) -> None:
     """Write plots, picture and report of a run again."""
     from qlb.results import Run, finish_run
 
     summary = Run(directory).summary
-    print_outcome(summary, finish_run(directory))
+    print_outcome(summary, finish_run(directory, most_bytes=int(1e6 * megabytes)))
+
+
+@app.command()
+def view(
+    directory: RunArgument,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser")] = True,
+) -> None:
+    """Open the report of a run, made again where it is older than the run, and print where it lies."""
+    from qlb.cli.view import view
+
+    view(directory, show=open_)
 
 
 @app.command()

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from qlb.results.figure import FigureGrid
 from qlb.results.files import write_text
-from qlb.results.report import Verdict, common, data_uri, flatten, template
+from qlb.results.report import data_uri, template
 from qlb.results.run import Run
+from qlb.results.wording import Verdict, common, flatten
 
 PAGE = "index.html"
 

@@ -20,7 +20,7 @@ from qlb.results import WriteError, layout
 from qlb.results.figure import FORMATS
 from qlb.results.figure_page import PAGE
 from qlb.results.files import write_text
-from qlb.results.report import flatten
+from qlb.results.wording import flatten
 from qlb.studies.reproduce_figures import IN_SUPPLEMENT
 
 FORMAT = "qlb reproduce"
