@@ -110,17 +110,17 @@ class LoadSettings(Settings):
         for k, traction in enumerate(self.traction):
             simulation.add(Traction(_faces(f"loads.traction.{k}", traction.faces, mesh), traction.value))
         for k, force in enumerate(self.forces):
-            nodes = _selected(f"loads.forces.{k}.nodes", "nodes", force.nodes, mesh.positions)
+            nodes = selected(f"loads.forces.{k}.nodes", "nodes", force.nodes, mesh.positions)
             simulation.add(PointForce(nodes, force.value))
 
 
 def _faces(key: str, expression: Expression, mesh: TetMesh) -> IntArray:
     """The outward surface triangles (k, 3) that `expression` selects."""
     faces = mesh.boundary_triangles()
-    return faces[_selected(f"{key}.faces", "centroids of surface triangles", expression, mesh.positions[faces].mean(1))]
+    return faces[selected(f"{key}.faces", "centroids of surface triangles", expression, mesh.positions[faces].mean(1))]
 
 
-def _selected(key: str, what: str, expression: Expression, points: FloatArray) -> IntArray:
+def selected(key: str, what: str, expression: Expression, points: FloatArray) -> IntArray:
     """Indices of the `points` (k, 3) [m] where `expression` is not zero.
 
     Raises:
