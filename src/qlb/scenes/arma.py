@@ -76,7 +76,7 @@ class ArmaScene(Scene):
 
     def _motion(self, apart: float) -> Keyframes:
         forward, up, out = self.pull.way
-        return Keyframes([0.0, self.pull.time], [[0, 0, 0], [forward, up, apart * out]], ease="smooth")
+        return Keyframes([0.0, self.pull.time], [[0.0, 0.0, 0.0], [forward, up, apart * out]], ease="smooth")
 
 
 def _in_box(mesh: TetMesh) -> FloatArray:
