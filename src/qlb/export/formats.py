@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 from qlb.errors import InputError
@@ -80,26 +81,16 @@ def export_run(
         WriteError: a file could not be written.
     """
     chosen = _chosen(format, out)
-    given = {name: value for name, value in options.items() if value is not None}
-    for name in given:
-        if name not in chosen.options:
-            takes = f"only {', '.join(chosen.options)}" if chosen.options else "it takes none"
-            raise InputError(f"format {chosen.name} has no option '{name}', {takes}")
-    done = 0
-
-    def count() -> None:
-        nonlocal done
-        done += 1
-        on_frame(done, len(recording.steps))
-
-    recording = Recording.of(run, steps, count)
+    given = _given(chosen, options)
+    done = count(1)
+    recording = Recording.of(run, steps, lambda: on_frame(next(done), len(recording.steps)))
     path = _path(run, out, chosen)
     earlier = _earlier(chosen, path, overwrite=overwrite)
     files = chosen.write(recording, path, **given)
     with suppress(OSError):
         for stale in set(earlier) - set(files):
             stale.unlink()
-    return Exported(chosen.name, files, len(recording.steps), _notes(recording, chosen, given))
+    return Exported(chosen.name, files, len(recording.steps), _notes(recording, chosen))
 
 
 def _chosen(name: str | None, out: Path | None) -> Format:
@@ -115,6 +106,16 @@ def _chosen(name: str | None, out: Path | None) -> Format:
     raise InputError(
         f"no format is given: must be one of {', '.join(FORMATS)}, or follow from the suffix of the output"
     )
+
+
+def _given(format: Format, options: dict[str, object]) -> dict[str, object]:
+    """The options that are not None. Raises `InputError` for one that the format does not take."""
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in given:
+        if name not in format.options:
+            takes = f"only {', '.join(format.options)}" if format.options else "it takes none"
+            raise InputError(f"format {format.name} has no option '{name}', {takes}")
+    return given
 
 
 def _path(run: Run, out: Path | None, format: Format) -> Path:
@@ -143,7 +144,7 @@ def _earlier(format: Format, path: Path, *, overwrite: bool) -> list[Path]:
     return earlier
 
 
-def _notes(recording: Recording, format: Format, given: dict[str, object]) -> list[str]:
+def _notes(recording: Recording, format: Format) -> list[str]:
     reason = recording.without_stress
     shows_stress = "volume" in format.options or format.name == "ply"
     return [f"without stress: {reason}"] if reason is not None and shows_stress else []
