@@ -28,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file")]
+SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file (YAML, TOML)")]
 SetOption = Annotated[
     list[str], typer.Option("--set", "-s", metavar="KEY=VALUE", help="Change a scene key; may be repeated")
 ]

@@ -17,7 +17,6 @@ from qlb.settings import FilePath, Settings, quantity
 from qlb.simulation import Simulation
 from qlb.system import Rotation
 
-
 Cells = Annotated[int, Field(le=1_000_000)]
 
 
