@@ -26,11 +26,11 @@ class Tethers(qlb.StencilEnergy):
         return np.asarray((x[:, 0] - self.places)[:, None])
 
     def hessian(self, x: npt.NDArray[np.float64], time: float) -> npt.NDArray[np.float64]:
-        return np.asarray(np.tile(np.eye(3), (len(x), 1, 1)))
+        return np.tile(np.eye(3), (len(x), 1, 1))
 
 
 def swing(anchors: npt.NDArray[np.float64], time: float) -> npt.NDArray[np.float64]:
-    return anchors + np.array([0.0, 0.1 * time, 0.0])
+    return np.asarray(anchors + np.array([0.0, 0.1 * time, 0.0]))
 
 
 def one_body() -> float:
