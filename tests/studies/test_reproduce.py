@@ -14,7 +14,7 @@ from qlb.results import Run, write_figure
 from qlb.results.figure import FORMATS, draw_grid
 from qlb.scenes import load_scene
 from qlb.studies import FIGURES, Plan, Reproduction, Update, chosen_figures, plan_figures, reproduce
-from qlb.studies import reproduce_processes as processes_module
+from qlb.studies import processes as processes_module
 
 reproduce_module = sys.modules["qlb.studies.reproduce"]
 TINY = ("mesh.cells=4,1,1", "steps=3")
@@ -207,7 +207,7 @@ if "default-ND" in job:
 if "default-QLB" in job:
     raise RuntimeError("out of luck")
 sys.stdin = io.StringIO(job)
-from qlb.studies.reproduce_worker import main
+from qlb.studies.worker import main
 sys.exit(main())
 """
 

@@ -129,8 +129,24 @@ def _print_tables(result: Reproduction) -> None:
             table.add_row(escape(row.row) if new else "", row.solver, *_cells(row))
         console.print(table)
     console.print("mean, max: nonlinear iterations a step; factors: Cholesky factorizations", soft_wrap=True)
+    _print_findings(result)
     console.print(f"figures     {escape(str(result.directory))}/figure-*", soft_wrap=True, highlight=False)
     console.print(f"page        {escape(str(result.page))}", soft_wrap=True, highlight=False)
+
+
+def _print_findings(result: Reproduction) -> None:
+    """How many statements hold, and those that do not."""
+    findings = [(grid.number, finding) for grid in result.grids for finding in grid.findings]
+    holds = sum(finding.holds is True for _, finding in findings)
+    console.print(
+        f"statements  {holds} of {len(findings)} hold; each stands on the page", soft_wrap=True, highlight=False
+    )
+    for number, finding in findings:
+        if finding.holds is not True:
+            text = (
+                f"  figure {number}, [yellow]{finding.verdict}[/]: {escape(f'{finding.statement} {finding.sentence}')}"
+            )
+            console.print(text, soft_wrap=True, highlight=False)
 
 
 def _cells(row: FigureRow) -> tuple[str, ...]:

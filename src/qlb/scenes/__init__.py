@@ -1,5 +1,6 @@
 """Scenes: what to simulate, as settings that a file or the command line can change."""
 
+from qlb.scenes.arma import ArmaScene
 from qlb.scenes.bar import BarScene
 from qlb.scenes.bodies import BodiesScene
 from qlb.scenes.bunny import BunnyScene
@@ -9,11 +10,18 @@ from qlb.scenes.scene import Scene
 from qlb.scenes.schema import scene_schema
 from qlb.scenes.writing import scene_yaml
 
-SCENES: dict[str, type[Scene]] = {"bar": BarScene, "bunny": BunnyScene, "ducks": DucksScene, "bodies": BodiesScene}
+SCENES: dict[str, type[Scene]] = {
+    "bar": BarScene,
+    "arma": ArmaScene,
+    "bunny": BunnyScene,
+    "ducks": DucksScene,
+    "bodies": BodiesScene,
+}
 """Every built-in scene by name."""
 
 __all__ = [
     "SCENES",
+    "ArmaScene",
     "BarScene",
     "BodiesScene",
     "BunnyScene",

@@ -58,7 +58,7 @@ class OfBody(Settings):
     def select_nodes(self, simulation: Simulation, key: str, expression: Expression) -> IntArray:
         """The nodes of the body that `expression` selects, shape (k,). Raises `InputError` where there are none."""
         nodes = self.nodes_of(simulation, key)
-        chosen = _selected(f"{key}.nodes", "nodes", expression, simulation.mesh.positions[nodes])
+        chosen = selected(f"{key}.nodes", "nodes", expression, simulation.mesh.positions[nodes])
         return np.asarray(nodes[chosen], dtype=np.int32)
 
     def select_faces(self, simulation: Simulation, key: str, expression: Expression) -> IntArray:
@@ -66,7 +66,7 @@ class OfBody(Settings):
         faces, x = simulation.mesh.boundary_triangles(), simulation.mesh.positions
         faces = faces[np.isin(faces[:, 0], self.nodes_of(simulation, key))]
         centroids = x[faces].mean(axis=1)
-        return faces[_selected(f"{key}.faces", "centroids of surface triangles", expression, centroids)]
+        return faces[selected(f"{key}.faces", "centroids of surface triangles", expression, centroids)]
 
 
 def unknown_body(key: str, name: str, known: list[str]) -> SettingError:
@@ -75,7 +75,7 @@ def unknown_body(key: str, name: str, known: list[str]) -> SettingError:
     return SettingError(key, f"{key}: no body has the name {name!r}: {names}")
 
 
-def _selected(key: str, what: str, expression: Expression, points: FloatArray) -> IntArray:
+def selected(key: str, what: str, expression: Expression, points: FloatArray) -> IntArray:
     """Indices of the `points` (k, 3) [m] where `expression` is not zero.
 
     Raises:

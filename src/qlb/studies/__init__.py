@@ -1,9 +1,9 @@
 """Runs of scenes: one into a directory, several side by side, or all that the supplement's figures need."""
 
 from qlb.studies.compare import Comparison, SolverCase, compare
+from qlb.studies.processes import Case, Update
 from qlb.studies.reproduce import Plan, Reproduction, plan_figures, reproduce
 from qlb.studies.reproduce_figures import FIGURES, SupplementFigure, chosen_figures
-from qlb.studies.reproduce_processes import Case, Update
 from qlb.studies.run import run_scene
 
 __all__ = [

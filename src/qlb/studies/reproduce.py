@@ -13,9 +13,10 @@ from qlb.results import Run
 from qlb.results.figure import FigureGrid, write_figure
 from qlb.results.figure_page import write_figures_page
 from qlb.scenes import load_scene
+from qlb.studies.processes import Case, Update, run_cases
 from qlb.studies.reproduce_figures import COLUMNS, FIGURES, Row, SupplementFigure
 from qlb.studies.reproduce_folder import RUNS, claim_folder
-from qlb.studies.reproduce_processes import Case, Update, run_cases
+from qlb.studies.statements import measure
 
 _FIXED = ("on_failure=accept", "threads=1", "output.stride=10")
 _OURS = ("solver", "on_failure", "threads")
@@ -204,4 +205,5 @@ def _grid(figure: SupplementFigure, plan: Plan, runs: dict[str, Run | None]) -> 
         found,
         figure.expectation,
         {} if plan.overrides else reference,
+        [statement.against(measure(found)) for statement in figure.statements],
     )

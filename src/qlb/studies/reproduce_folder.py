@@ -21,7 +21,7 @@ from qlb.results.figure import FORMATS
 from qlb.results.figure_page import PAGE
 from qlb.results.files import write_text
 from qlb.results.report import flatten
-from qlb.studies.reproduce_figures import IN_SUPPLEMENT
+from qlb.studies.reproduce_figures import FIGURES
 
 FORMAT = "qlb reproduce"
 VERSION = 1
@@ -96,6 +96,6 @@ def _check_settings(
 
 def _clear(directory: Path) -> None:
     """Delete figures and page; runs are replaced when their turn comes."""
-    names = [f"figure-{number}.{suffix}" for number in IN_SUPPLEMENT for suffix in (*FORMATS, "csv")]
+    names = [f"figure-{number}.{suffix}" for number in FIGURES for suffix in (*FORMATS, "csv")]
     for name in (*names, PAGE):
         (directory / name).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""One case in a process of its own: `python -m qlb.studies.reproduce_worker`, started by `reproduce_processes`.
+"""One case in a process of its own: `python -m qlb.studies.worker`, started by `processes`.
 
 Reads {"scene": the resolved scene, "directory": the run directory} from standard input and writes a line "step N" to
 standard output after each step. Exit status 0: the run is complete; 1: it is not, and the last line says why.

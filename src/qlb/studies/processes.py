@@ -14,7 +14,7 @@ from queue import Empty, Queue
 from threading import Thread
 from typing import Any, Literal
 
-WORKER = (sys.executable, "-P", "-m", "qlb.studies.reproduce_worker")
+WORKER = (sys.executable, "-P", "-m", "qlb.studies.worker")
 """The command that runs a case; see there for what it reads and writes."""
 
 _SECONDS_BETWEEN_LOOKS = 0.2
