@@ -132,6 +132,27 @@ def reproduce(
 
 
 @app.command()
+def sweep(
+    scene: SceneArgument,
+    set_: Annotated[
+        list[str],
+        typer.Option("--set", "-s", metavar="KEY=VALUE,...", help="Values of a key; [1,2] in brackets is one"),
+    ] = [],  # noqa: B006
+    steps: StepsOption = None,
+    out: OutOption = None,
+    processes: Annotated[int | None, typer.Option(help="Runs at a time; by default one for each CPU")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers run them")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Run everything in the output folder again")] = False,
+) -> None:
+    """Run a scene with every combination of values; leave one table. The same call again goes on."""
+    from qlb.cli.sweep import run_sweep
+
+    directory = out or Path("runs") / f"{Path(scene).stem}-sweep"
+    changes = _overrides({"steps": steps})
+    raise typer.Exit(run_sweep(scene, set_, changes, directory, processes, scheduler, overwrite=overwrite))
+
+
+@app.command()
 def scenes(
     show: Annotated[str | None, typer.Option(help="Print this scene as a file to start from")] = None,
 ) -> None:

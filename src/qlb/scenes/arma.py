@@ -9,10 +9,9 @@ from pydantic import Field
 
 from qlb import shapes
 from qlb.arrays import FloatArray, IntArray
-from qlb.bodies import Placement
 from qlb.fields import Expression
 from qlb.mesh import TetMesh
-from qlb.scenes.contact_scene import CharacterMesh
+from qlb.scenes.contact_scene import CharacterMesh, lifted
 from qlb.scenes.loads import LoadSettings
 from qlb.scenes.scene import Scene
 from qlb.scenes.selections import Selection, selected
@@ -59,7 +58,7 @@ class ArmaScene(Scene):
 
     def make(self) -> Simulation:
         """The armadillo with its feet held. Raises `InputError` where mesh or settings are wrong."""
-        mesh = Placement(rotation=self.mesh.rotation).of(self.mesh.make(shapes.armadillo))
+        mesh = lifted(self.mesh.make(shapes.armadillo), self.mesh.rotation, lowest=0.0)
         simulation = Simulation(mesh, **self.simulation_arguments() | self.composition())
         places = _in_box(mesh)
         simulation.pin(selected("pull.feet", "nodes", self.pull.feet, places))
