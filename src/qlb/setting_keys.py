@@ -144,12 +144,16 @@ def key_fields(model: type[BaseModel], prefix: str = "") -> dict[str, FieldInfo]
     fields: dict[str, FieldInfo] = {}
     for name, field in model.model_fields.items():
         inner = nested_models(field.annotation)
-        is_list = get_origin(field.annotation) is tuple and bool(inner)
+        is_list = bool(inner) and _has_list(field.annotation)
         for member in inner:
             fields |= key_fields(member, f"{prefix}{name}.{ENTRY}." if is_list else f"{prefix}{name}.")
         if is_list or not inner:
             fields[prefix + name] = field
     return fields
+
+
+def _has_list(annotation: Any) -> bool:
+    return get_origin(annotation) is tuple or any(map(_has_list, get_args(annotation)))
 
 
 def nested_models(annotation: Any) -> list[type[BaseModel]]:

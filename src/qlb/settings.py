@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self, TypeVar, get_args
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -39,7 +40,13 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-FilePath = Annotated[Path, PlainSerializer(plain, when_used="json")]
+def _path(path: Path) -> Path:
+    if "\0" in str(path) or max(map(len, path.parts), default=0) > LONGEST_NAME:
+        raise InputError(f"{str(path)[:60]!r} is no name of a file")
+    return path
+
+
+FilePath = Annotated[Path, AfterValidator(_path), PlainSerializer(plain, when_used="json")]
 """A file. In a scene file it is relative to that file; it is written as absolute."""
 
 _NUMBER = {"type": "number"}
@@ -59,6 +66,9 @@ PerElement = Annotated[
 of the rest position such as "2e4 * (1 + x)", or a function of the elements' centroids (m, 3) [m] that gives (m,)."""
 
 T = TypeVar("T", bound="Settings")
+
+LONGEST_NAME = 255
+"""Characters of a part of a path."""
 
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 

@@ -337,7 +337,7 @@ TWO = ONE + "  - name: b\n    mesh: {shape: ball, tets: 200}\n    placement: {tr
         (ONE + "obstacles: [{name: a}]\n", "4:14", ["obstacles.0.name: 'a' is given already to bodies.0"]),
         (ONE + "obstacles: [{normal: [0, 0, 0]}]\n", "4:13", ["obstacles.0", "has no length"]),
         (ONE + "obstacles: [{mesh: {shape: torus, radius: -1}}]\n", "4:35", ["obstacles.0.mesh.radius", "> 0 m"]),
-        (ONE + "contact: {pairs: [{between: [a, c]}]}\nobstacles: [{}]\n", "", ["'c' is not known"]),
+        (ONE + "contact: {pairs: [{between: [a, c]}]}\n", "4:19", ["contact.pairs.0: 'c' is not known"]),
         (ONE + "contact: 3\n", "4:1", ["contact = 3 must hold keys and values"]),
         ("bodys: []\n", "1:1", ["scene is missing", "bodies"]),
     ],

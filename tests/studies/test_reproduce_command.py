@@ -44,7 +44,7 @@ def test_prints_a_line_for_each_case_and_a_table(command, tmp_path):
 
 
 def test_wrong_input_is_one_line(command):
-    for arguments in (["7"], ["1", "--processes", "0"], ["1", "--set", "solver=ND"]):
+    for arguments in (["11"], ["1", "--processes", "0"], ["1", "--set", "solver=ND"]):
         status, out, err = command(*arguments)
         assert (status, out, len(err.splitlines())) == (2, "", 1)
 

@@ -32,7 +32,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file")]
+SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file (YAML, TOML)")]
 SetOption = Annotated[
     list[str], typer.Option("--set", "-s", metavar="KEY=VALUE", help="Change a scene key; may be repeated")
 ]
@@ -177,6 +177,27 @@ def mesh(
     from qlb.cli.mesh import mesh_file
 
     mesh_file(source, target, edge=edge, tets=tets, scale=scale, height=height, overwrite=overwrite)
+
+
+@app.command()
+def sweep(
+    scene: SceneArgument,
+    set_: Annotated[
+        list[str],
+        typer.Option("--set", "-s", metavar="KEY=VALUE,...", help="Values of a key; [1,2] in brackets is one"),
+    ] = [],  # noqa: B006
+    steps: StepsOption = None,
+    out: OutOption = None,
+    processes: Annotated[int | None, typer.Option(help="Runs at a time; by default one for each CPU")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers run them")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Run everything in the output folder again")] = False,
+) -> None:
+    """Run a scene with every combination of values; leave one table. The same call again goes on."""
+    from qlb.cli.sweep import run_sweep
+
+    directory = out or Path("runs") / f"{Path(scene).stem}-sweep"
+    changes = _overrides({"steps": steps})
+    raise typer.Exit(run_sweep(scene, set_, changes, directory, processes, scheduler, overwrite=overwrite))
 
 
 @app.command()

@@ -75,7 +75,8 @@ class Fibres(Settings):
         if directions.shape not in ((3,), (count, 3)):
             raise InputError(f"fibre directions have shape {directions.shape}, must be (3,) or ({count}, 3)")
         directions = np.broadcast_to(directions, (count, 3))
-        length = np.linalg.norm(directions, axis=1)
+        with np.errstate(over="ignore"):
+            length = np.linalg.norm(directions, axis=1)
         bad = ~(np.isfinite(length) & (length > 0))
         if bad.any():
             e = int(np.argmax(bad))

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 # A tet counts as flat when its volume is below this fraction of its longest edge cubed (a regular one has 0.118).
 FLAT = 1e-10
 
+FARTHEST = 1e60
+"""Of a node from the origin [m]: powers of lengths further away are no numbers any more."""
+
 
 class TetMesh:
     """Linear tetrahedra at rest, checked when made.
@@ -239,10 +242,11 @@ def _check_indices(tets: npt.NDArray[np.integer], nodes: int) -> None:
 
 
 def _check_geometry(mesh: TetMesh) -> None:
-    bad = ~np.isfinite(mesh.positions).all(axis=1)
+    bad = ~(np.abs(mesh.positions) < FARTHEST).all(axis=1)
     if bad.any():
         i = int(np.argmax(bad))
-        raise InputError(f"node {i} has position {mesh.positions[i].tolist()}, must be finite")
+        allowed = f"nearer than {FARTHEST:g} m" if np.isfinite(mesh.positions[i]).all() else "finite"
+        raise InputError(f"node {i} has position {mesh.positions[i].tolist()}, must be {allowed}")
     volume = mesh.volumes()
     scale = mesh.edge_lengths().max(axis=1) ** 3
     flat = np.abs(volume) <= FLAT * scale

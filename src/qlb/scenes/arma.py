@@ -9,10 +9,9 @@ from pydantic import Field
 
 from qlb import shapes
 from qlb.arrays import FloatArray, IntArray
-from qlb.bodies import Placement
 from qlb.fields import Expression
 from qlb.mesh import TetMesh
-from qlb.scenes.contact_scene import CharacterMesh
+from qlb.scenes.contact_scene import CharacterMesh, lifted
 from qlb.scenes.loads import LoadSettings
 from qlb.scenes.scene import Scene
 from qlb.scenes.selections import Selection, selected
@@ -59,7 +58,7 @@ class ArmaScene(Scene):
 
     def make(self) -> Simulation:
         """The armadillo with its feet held. Raises `InputError` where mesh or settings are wrong."""
-        mesh = Placement(rotation=self.mesh.rotation).of(self.mesh.make(shapes.armadillo))
+        mesh = lifted(self.mesh.make(shapes.armadillo), self.mesh.rotation, lowest=0.0)
         simulation = Simulation(mesh, **self.simulation_arguments() | self.composition())
         places = _in_box(mesh)
         simulation.pin(selected("pull.feet", "nodes", self.pull.feet, places))
@@ -73,7 +72,8 @@ class ArmaScene(Scene):
         nodes = selected("pull.hands", "nodes", self.pull.hands, places)
         right = places[nodes, 2] > 0.5
         if right.all() or not right.any():
-            raise SettingError("pull.hands", f"pull.hands: {self.pull.hands} selects nodes on one side of z = 0.5 only")
+            problem = f"{self.pull.hands} selects nodes on one side of z = 0.5 only"
+            raise SettingError("pull.hands", f"pull.hands: {problem}")
         return [nodes[right], nodes[~right]]
 
     def _motion(self, apart: float) -> Keyframes:

@@ -86,7 +86,7 @@ class BodiesScene(Scene):
     """Bodies of your own, with what holds, moves and meets them."""
 
     scene: Literal["bodies"] = "bodies"
-    bodies: Annotated[tuple[BodySettings, ...], list_of("{name: ball, mesh: {shape: ball}}"), Field(min_length=1)] = (
+    bodies: Annotated[tuple[BodySettings, ...], Field(min_length=1), list_of("{name: ball, mesh: {shape: ball}}")] = (
         Field(description="Elastic bodies")
     )
 

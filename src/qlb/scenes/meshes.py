@@ -106,7 +106,7 @@ def _shape_model(name: str) -> type[ShapeMesh]:
         kind, description, extra = _ARGUMENTS[argument]
         fields[argument] = (kind, quantity(parameter.default, description, **extra))
     doc = (inspect.getdoc(function) or name).splitlines()[0]
-    return create_model(f"{name.capitalize()}Mesh", __base__=ShapeMesh, __doc__=doc, __module__=__name__, **fields)
+    return create_model(f"{name.capitalize()}Shape", __base__=ShapeMesh, __doc__=doc, __module__=__name__, **fields)
 
 
 SHAPE_MODELS = {name: _shape_model(name) for name in SHAPES}

@@ -62,7 +62,7 @@ def _index(place: dict[str, Any] | list[Any], part: str, key: str) -> Any:
 
 def _value(text: str) -> Any:
     """A value as YAML reads it; "1,2,3" is a list, and "where(x < 1, 2, 3)" is not."""
-    parts = _split(text)
+    parts = split_values(text)
     if len(parts) > 1:
         return [_value(part) for part in parts]
     try:
@@ -71,7 +71,7 @@ def _value(text: str) -> Any:
         return text
 
 
-def _split(text: str) -> list[str]:
+def split_values(text: str) -> list[str]:
     """The parts of `text` between commas, other than commas inside brackets."""
     parts, depth = [""], 0
     for character in text:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
-from pydantic.json_schema import models_json_schema
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
 from qlb.materials import MATERIALS
 from qlb.scenes.scene import FORMAT_VERSION
 from qlb.setting_keys import TAGS
+from qlb.settings import plain
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _KEYWORDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
@@ -18,6 +20,14 @@ _DEFAULT_MATERIAL = next(iter(MATERIALS))
 """Settings of a material without `model` mean this one."""
 
 Schema = dict[str, Any]
+
+
+class _Generator(GenerateJsonSchema):
+    """Writes defaults as scene files do."""
+
+    def encode_default(self, dft: Any) -> Any:
+        """A default as plain data."""
+        return super().encode_default(plain(dft))
 
 
 def scene_schema() -> Schema:
@@ -29,7 +39,8 @@ def scene_schema() -> Schema:
     from qlb.scenes import SCENES
 
     kinds = list(SCENES.values())
-    references, whole = models_json_schema([(kind, "validation") for kind in kinds])
+    modes: list[tuple[type[BaseModel], Literal["validation"]]] = [(kind, "validation") for kind in kinds]
+    references, whole = models_json_schema(modes, schema_generator=_Generator)
     definitions: dict[str, Schema] = json.loads(json.dumps(whole["$defs"]))  # nothing in it is shared
     for definition in definitions.values():
         _finish(definition)

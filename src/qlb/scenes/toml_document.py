@@ -13,7 +13,7 @@ _KEY = rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*"
 _TABLE = re.compile(rf"[ \t]*(\[\[?)[ \t]*({_KEY})[ \t]*\]")
 _PAIR = re.compile(rf"[ \t]*({_KEY})[ \t]*=")
 _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MOST_LEVELS},}}", re.MULTILINE)
-_WHERE = re.compile(r" \(at line (\d+), column (\d+)\)$")
+_WHERE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 Path = tuple[str | int, ...]
 
@@ -26,7 +26,10 @@ def parse_toml(text: str) -> Node:
         return _node(tomllib.loads(text), (), _places(text))
     except tomllib.TOMLDecodeError as error:
         found = _WHERE.search(str(error))
-        place = Place(int(found[1]), int(found[2])) if found else None
+        end = text.rstrip("\n")
+        place = Place(end.count("\n") + 1, len(end) - end.rfind("\n"))
+        if found and found[1]:
+            place = Place(int(found[1]), int(found[2]))
         raise SyntaxProblem(_WHERE.sub("", str(error)), place) from None
     except RecursionError:
         raise SyntaxProblem("is nested too deep") from None

@@ -63,7 +63,8 @@ def box(size: Sequence[float] = (0.2, 0.2, 0.2), *, tets: int | None = None, edg
         positive("box: size", float(length))
     given = _size(tets, edge)
     if edge is not None:
-        cells = np.maximum(1, np.rint(lengths / positive("box: edge", edge)))
+        with np.errstate(over="ignore"):
+            cells = np.maximum(1, np.rint(lengths / positive("box: edge", edge)))
     else:
         cells = _cells(lengths, whole_number("box: tets", given["tets"], 6, 2_000_000))
     if not np.isfinite(cells).all():
