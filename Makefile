@@ -53,4 +53,4 @@ setup: .venv/.installed
 	touch $@
 
 clean:
-	rm -rf .venv build
+	rm -rf .venv build web/node_modules src/qlb/results/static

@@ -46,8 +46,9 @@ export class Transport {
     const toggleEdges = () => lines.setAttribute("aria-pressed", String(actions.toggleEdges()));
     lines.setAttribute("aria-pressed", String(edges));
     this.slider.addEventListener("input", () => {
+      const index = Number(this.slider.value);
       clock.pause();
-      clock.goTo(Number(this.slider.value));
+      clock.goTo(index);
     });
     const track = element("div", { class: "track" }, this.slider, this.marks);
     this.root.append(

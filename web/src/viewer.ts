@@ -156,6 +156,7 @@ async function start(): Promise<void> {
     const animations = await Promise.all(data.animations.map((animation) => Animation.from(animation)));
     const shown = animations.filter((animation) => animation.frames.length > 0);
     const viewer = new Viewer(root, shown, data);
+    Object.assign(root, { animations: shown }); // for who asks in the console
     root.dataset.ready = "yes";
     if (data.live) follow(shown[0], () => viewer.framesChanged());
   } catch (error) {
