@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from qlb.cli.notes import show_notes
 from qlb.cli.output import console, errors, print_comparison, print_outcome
 from qlb.cli.progress import Interrupt, StepReporter
 from qlb.errors import InputError, QlbError
@@ -153,6 +154,24 @@ def sweep(
 
 
 @app.command()
+def mesh(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A file of tets, or of a surface to fill with them")],
+    target: Annotated[
+        Path | None, typer.Argument(metavar="[OUT]", help="Where to write tets; the suffix says how")
+    ] = None,
+    edge: Annotated[float | None, typer.Option(help="Target edge length [m], after scaling")] = None,
+    tets: Annotated[int | None, typer.Option(help="Or: about how many tets [default: 5000]")] = None,
+    scale: Annotated[float | None, typer.Option(help="Multiply all lengths")] = None,
+    height: Annotated[float | None, typer.Option(help="Or: scale to this height along y [m]")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT")] = False,
+) -> None:
+    """Look at a mesh, fill a surface with tets, or write tets in another format."""
+    from qlb.cli.mesh import mesh_file
+
+    mesh_file(source, target, edge=edge, tets=tets, scale=scale, height=height, overwrite=overwrite)
+
+
+@app.command()
 def scenes(
     show: Annotated[str | None, typer.Option(help="Print this scene as a file to start from")] = None,
 ) -> None:
@@ -215,6 +234,7 @@ class _quiet:  # noqa: N801
 
 def main() -> None:
     """Entry point of the `qlb` command."""
+    show_notes()
     try:
         app()
     except InputError as error:

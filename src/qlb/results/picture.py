@@ -58,7 +58,7 @@ def render_frames(
 ) -> None:
     """Render chosen frames side by side into one PNG, all from the same camera.
 
-    The surface is coloured by the distance of each node from its place at rest, or where there are several bodies by
+    The surface is coloured by the distance of each vertex from its place at rest, or where there are several bodies by
     the body. Obstacles and planes are grey; without any the rest shape is drawn faintly.
 
     Args:
@@ -97,23 +97,23 @@ def _spread(steps: Sequence[int], count: int = 6) -> list[int]:
 
 @dataclass(frozen=True)
 class _Surface:
-    """The boundary of all bodies, at rest and in each frame."""
+    """What is shown of all bodies, at rest and in each frame."""
 
     triangles: IntArray
     rest: FloatArray
     deformed: list[FloatArray]
     body: IntArray
-    """of each node, shape (k,)"""
+    """of each vertex, shape (k,)"""
     names: tuple[str, ...]
     """of the bodies"""
 
     @staticmethod
     def of(run: Run, frames: Sequence[Frame]) -> _Surface:
-        nodes, renumbered = np.unique(run.mesh.boundary_triangles(), return_inverse=True)
-        triangles = renumbered.reshape(-1, 3).astype(np.int32)
-        deformed = [frame.positions[nodes] for frame in frames]
         parts = run.parts
-        return _Surface(triangles, run.mesh.positions[nodes], deformed, parts.groups[nodes], parts.body_names)
+        shown = parts.mesh.rendered()
+        deformed = [shown.of_nodes(frame.positions) for frame in frames]
+        rest = shown.of_nodes(parts.mesh.positions)
+        return _Surface(shown.triangles, rest, deformed, parts.groups[shown.nodes[:, 0]], parts.body_names)
 
     @cached_property
     def everywhere(self) -> FloatArray:
@@ -133,7 +133,7 @@ class _Surface:
         return {"scalars": of_face, "clim": (-0.5, len(self.names) - 0.5), "cmap": ListedColormap(self.colours)}
 
     def displacement(self, x: FloatArray) -> FloatArray:
-        """Distance of each node from its place at rest [m], shape (k,)."""
+        """Distance of each vertex from its place at rest [m], shape (k,)."""
         return np.asarray(np.linalg.norm(x - self.rest, axis=1))
 
     @property

@@ -9,23 +9,26 @@ from pydantic import Field
 
 from qlb.materials import Fibres
 from qlb.mesh import TetMesh
-from qlb.scenes.meshes import mesh_from_file
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import Scene
 from qlb.scenes.values import Vector
 from qlb.setting_keys import at_key
-from qlb.settings import FilePath, Settings, quantity
+from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 from qlb.system import Rotation
 
 Cells = Annotated[int, Field(le=1_000_000)]
 
 
-class BoxMeshSettings(Settings):
+class BoxMeshSettings(MeshSource):
     """A box of tetrahedra, or a mesh file."""
 
     size: Vector = Field((1.0, 0.25, 0.25), description="Lengths of the box [m]")
     cells: tuple[Cells, Cells, Cells] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
-    path: FilePath | None = Field(None, description="A tetrahedral mesh file to use instead of the box")
+
+    def make(self) -> TetMesh:
+        """The mesh. Raises `InputError` where the file or a setting is wrong."""
+        return TetMesh.box(self.size, cells=self.cells) if self.path is None else self.load(self.path)
 
 
 class TwistSettings(Settings):
@@ -47,8 +50,7 @@ class BarScene(Scene):
     def make(self) -> Simulation:
         """The bar with its ends held. Raises `InputError` where mesh or settings are wrong."""
         with at_key("mesh"):
-            box, path = self.mesh, self.mesh.path
-            mesh = TetMesh.box(box.size, cells=box.cells) if path is None else mesh_from_file(path)
+            mesh = self.mesh.make()
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         near = 1e-6 * (high[0] - low[0])
         simulation = Simulation(mesh, **self.simulation_arguments() | self.composition() | self._variation(mesh))

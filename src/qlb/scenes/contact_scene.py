@@ -13,25 +13,23 @@ from qlb.energies import Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, StableNeoHookean
 from qlb.mesh import TetMesh
-from qlb.scenes.meshes import mesh_from_file
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import MOST_STEPS, AnyContact, Scene
 from qlb.scenes.values import Vector
 from qlb.setting_keys import at_key
-from qlb.settings import FilePath, Settings, choice, quantity
+from qlb.settings import choice, quantity
 from qlb.simulation import Simulation
 
 
-class CharacterMesh(Settings):
+class CharacterMesh(MeshSource):
     """A character of `qlb.shapes`, or a mesh file, y up."""
 
-    path: FilePath | None = Field(None, description="A tetrahedral mesh file to use instead of the shape, y up")
-    tets: int = quantity(5000, "About how many tetrahedra the shape is to have; a file has its own", ge=100)
     height: float = quantity(0.3, "Height along y before it is turned, to which the mesh is scaled", unit="m", gt=0)
 
     def make(self, shape: Callable[..., TetMesh]) -> TetMesh:
         """The mesh. Raises `InputError` where the file is wrong, or the shape cannot be made with so few tets."""
         with at_key("mesh"):
-            mesh = shape(tets=self.tets) if self.path is None else mesh_from_file(self.path)
+            mesh = shape(**self.target()) if self.path is None else self.load(self.path)
         return Placement(scale=self.height / float(np.ptp(mesh.positions[:, 1]))).of(mesh)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from functools import reduce
 from operator import or_
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -13,16 +12,12 @@ from pydantic import Discriminator, Field, Tag, create_model
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.mesh import TetMesh
-from qlb.mesh.files import read_triangles
+from qlb.mesh.files import read_surface
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.values import Vector
 from qlb.settings import FilePath, Settings, quantity
 from qlb.shapes import SHAPES
 from qlb.shapes.mesher import FEWEST, MOST
-
-
-def mesh_from_file(path: Path) -> TetMesh:
-    """The tets of a mesh file. Raises `InputError`; the one place where a path of a scene becomes a mesh."""
-    return TetMesh.read(path)
 
 
 class MeshSettings(Settings):
@@ -40,18 +35,18 @@ class MeshSettings(Settings):
         return mesh.positions[used], renumbered.reshape(faces.shape).astype(np.int32)
 
 
-class FileMesh(MeshSettings):
-    """A mesh file: tetrahedra for a body, triangles for an obstacle."""
+class FileMesh(MeshSettings, MeshSource):
+    """A mesh file: tetrahedra or a surface to fill for a body, triangles for an obstacle."""
 
-    path: FilePath = Field(description="A mesh file; in a scene file relative to that")
+    path: FilePath = Field(description="A mesh file: tets, or a surface, which is filled with tets for a body")
 
     def make(self) -> TetMesh:
-        """The tets of the file."""
-        return mesh_from_file(self.path)
+        """The tets of the file, or within its surface."""
+        return self.load(self.path)
 
     def surface(self) -> tuple[FloatArray, IntArray]:
         """The triangles of the file."""
-        return read_triangles(self.path)
+        return read_surface(self.path)
 
 
 class ShapeMesh(MeshSettings):

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qlb.arrays import FloatArray, IntArray
+from qlb.arrays import FloatArray, IntArray, whole_number
 from qlb.errors import InputError
 from qlb.mesh import TetMesh
+from qlb.mesh.geometry import tet_components
 from qlb.shapes.smoothing import smooth
 from qlb.shapes.solid import Solid
 from qlb.shapes.stuffing import stuff
-from qlb.shapes.topology import characteristic, is_closed_surface, pieces
+from qlb.shapes.topology import characteristic, is_closed_surface
 
 FEWEST, MOST = 100, 2_000_000
 CLOSE, ALLOWED = 0.03, 0.2
@@ -68,14 +69,6 @@ def mesh_solid(
         # Down to a twentieth of the bounds may be solid.
         mesh = _Filling(solid, f"{name} of {tets} tets", euler, min(LATTICE, 2e5 + 20 * wanted)).by_number(wanted)
     return smooth(mesh, solid) if smoothing else mesh
-
-
-def whole_number(name: str, value: object, low: int, high: int) -> int:
-    """`value` as an int, which must be a whole number from `low` to `high`."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not low <= value <= high:  # type: ignore[operator]
-        raise InputError(f"{name} {value!r} is out of range: a whole number, {low} to {high}")
-    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 @dataclass
@@ -143,7 +136,7 @@ class _Filling:
             self.refusal = "is too coarse: no lattice point falls into the solid"
             return None
         mesh = TetMesh(positions, tets)
-        count = pieces(mesh)
+        count = tet_components(mesh.tets)
         if count > 1:
             self.refusal = f"falls into {count} pieces: the solid must be one piece, and thicker than its edges"
         elif not is_closed_surface(mesh):

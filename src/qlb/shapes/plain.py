@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from qlb.arrays import FloatArray, vectors
+from qlb.arrays import FloatArray, vectors, whole_number
 from qlb.errors import InputError
 from qlb.mesh import TetMesh
-from qlb.shapes.mesher import mesh_solid, whole_number
+from qlb.shapes.mesher import mesh_solid
 from qlb.shapes.primitives import positive, ring, rounded_cylinder, sphere
 
 DEFAULT_TETS = 5000
