@@ -9,7 +9,7 @@ from pydantic import Field
 
 from qlb.materials import Fibres
 from qlb.mesh import TetMesh
-from qlb.scenes.meshes import MeshSource
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import Scene
 from qlb.scenes.values import Vector
 from qlb.setting_keys import at_key
@@ -28,8 +28,7 @@ class BoxMeshSettings(MeshSource):
 
     def make(self) -> TetMesh:
         """The mesh. Raises `InputError` where the file or a setting is wrong."""
-        with at_key("mesh"):
-            return self.from_file() or TetMesh.box(self.size, cells=self.cells)
+        return TetMesh.box(self.size, cells=self.cells) if self.path is None else self.load(self.path)
 
 
 class TwistSettings(Settings):
@@ -50,7 +49,8 @@ class BarScene(Scene):
 
     def make(self) -> Simulation:
         """The bar with its ends held. Raises `InputError` where mesh or settings are wrong."""
-        mesh = self.mesh.make()
+        with at_key("mesh"):
+            mesh = self.mesh.make()
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         near = 1e-6 * (high[0] - low[0])
         simulation = Simulation(mesh, **self.simulation_arguments() | self.composition() | self._variation(mesh))

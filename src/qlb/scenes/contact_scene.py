@@ -13,7 +13,7 @@ from qlb.energies import Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, StableNeoHookean
 from qlb.mesh import TetMesh
-from qlb.scenes.meshes import MeshSource
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import MOST_STEPS, AnyContact, Scene
 from qlb.scenes.values import Vector
 from qlb.setting_keys import at_key
@@ -29,7 +29,7 @@ class CharacterMesh(MeshSource):
     def make(self, shape: Callable[..., TetMesh]) -> TetMesh:
         """The mesh. Raises `InputError` where the file is wrong, or the shape cannot be made with so few tets."""
         with at_key("mesh"):
-            mesh = self.from_file() or shape(**self.target())
+            mesh = shape(**self.target()) if self.path is None else self.load(self.path)
         return Placement(scale=self.height / float(np.ptp(mesh.positions[:, 1]))).of(mesh)
 
 

@@ -11,34 +11,13 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, create_model
 
 from qlb.arrays import FloatArray, IntArray
-from qlb.mesh import TetMesh, read_surface
+from qlb.mesh import TetMesh
+from qlb.mesh.files import read_surface
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.values import Vector
 from qlb.settings import FilePath, Settings, quantity
 from qlb.shapes import SHAPES
 from qlb.shapes.mesher import FEWEST, MOST
-
-
-class MeshTarget(Settings):
-    """How fine a mesh is to be that is made."""
-
-    tets: int = quantity(
-        5000, "About how many tets a shape or surface is to have; a file of tets has its own", ge=FEWEST, le=MOST
-    )
-    edge: float | None = quantity(None, "Or the length of its edges, before the mesh is scaled", unit="m", gt=0)
-
-    def target(self) -> dict[str, Any]:
-        """As shapes and `TetMesh.load` take it."""
-        return {"tets": self.tets} if self.edge is None else {"edge": self.edge}
-
-
-class MeshSource(MeshTarget):
-    """A file of tetrahedra, or of a surface that is filled with them, in place of what a scene has itself."""
-
-    path: FilePath | None = Field(None, description="A mesh file to use instead: tets, or a surface to fill with tets")
-
-    def from_file(self) -> TetMesh | None:
-        """The mesh of the file, where one is given. Raises `InputError`."""
-        return None if self.path is None else TetMesh.load(self.path, **self.target())
 
 
 class MeshSettings(Settings):
@@ -56,14 +35,14 @@ class MeshSettings(Settings):
         return mesh.positions[used], renumbered.reshape(faces.shape).astype(np.int32)
 
 
-class FileMesh(MeshTarget, MeshSettings):
-    """A mesh file: for a body of tetrahedra, or a surface to fill with them; for an obstacle a surface."""
+class FileMesh(MeshSettings, MeshSource):
+    """A mesh file: tetrahedra or a surface to fill for a body, triangles for an obstacle."""
 
-    path: FilePath = Field(description="A mesh file; in a scene file relative to that")
+    path: FilePath = Field(description="A mesh file: tets, or a surface, which is filled with tets for a body")
 
     def make(self) -> TetMesh:
         """The tets of the file, or within its surface."""
-        return TetMesh.load(self.path, **self.target())
+        return self.load(self.path)
 
     def surface(self) -> tuple[FloatArray, IntArray]:
         """The triangles of the file."""
