@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from qlb.errors import InputError
 from qlb.results import Run
@@ -225,7 +225,7 @@ def _name(chosen: dict[str, str]) -> str:
     return plain if plain == text and len(plain) <= 100 else f"{plain[:90]}-{sha256(text.encode()).hexdigest()[:8]}"
 
 
-def _without(scene: dict[str, Any], keys: Sequence[str] | dict[str, list[str]]) -> dict[str, Any]:
+def _without(scene: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
     """The settings but for those that a sweep changes, whole groups where their kind may change."""
     left: dict[str, Any] = {name: dict(value) if isinstance(value, dict) else value for name, value in scene.items()}
     for key in keys:
@@ -246,17 +246,15 @@ def _is_done(case: Case) -> bool:
 def _row(member: SweepCase, end: Update | None) -> Row:
     """The row of a case that is done, was refused, or ended as `end` says."""
     row: Row = {"case": member.name, **member.values}
-    run = run_of(member.case) if member.case else None
-    status: Literal["refused", "crashed"] = "refused" if member.case is None else "crashed"
-    error = member.error
-    if run is not None:
-        return row | {"status": run.summary["status"], "error": run.summary["error"] or ""} | _numbers(run)
-    if end is not None:
-        status = "refused" if end.state == "refused" else "crashed"
-        unseen = "it finished, but its folder is not to be seen from here: it must be shared with the workers"
-        error = end.message or unseen
     blank = dict.fromkeys((*COUNTS, "failed_steps", *TIMINGS), "")
-    return row | {"status": status, "error": error} | blank
+    if member.case is None:
+        return row | {"status": "refused", "error": member.error} | blank
+    state = "kept" if end is None else end.state
+    run = None if state == "refused" else run_of(member.case)
+    if run is not None and (state != "crashed" or run.summary["status"] == "failed"):
+        return row | {"status": run.summary["status"], "error": run.summary["error"] or ""} | _numbers(run)
+    error = (end and end.message) or "it ended well, but its folder is not to be seen from here"
+    return row | {"status": "refused" if state == "refused" else "crashed", "error": error} | blank
 
 
 def _numbers(run: Run) -> Row:
