@@ -213,7 +213,7 @@ function obstaclesOf(animation: Animation): Mesh<BufferGeometry, MeshLambertMate
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * corners), 3));
   geometry.setAttribute("normal", new BufferAttribute(new Float32Array(3 * corners), 3));
-  const material = new MeshLambertMaterial({ color: "#c3c9d1", side: DoubleSide });
+  const material = new MeshLambertMaterial({ color: "#949da8", side: DoubleSide });
   const mesh = new Mesh(geometry, material);
   mesh.frustumCulled = false;
   mesh.castShadow = mesh.receiveShadow = true;
