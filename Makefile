@@ -6,7 +6,7 @@ NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
 WEB := scripts/build-web.sh $(shell find web -type f -not -path '*/node_modules/*')
 FORMATTED := src tests benchmarks examples
 
-.PHONY: run test quick lint format stubs bench docs setup clean
+.PHONY: run test wheel quick lint format stubs bench docs setup clean
 
 run: setup  ## Run the bar; leaves a picture, a plot and a report below runs/
 	$(BIN)/qlb run bar
@@ -38,6 +38,10 @@ bench: setup  ## Benchmarks of a step and of the kernels; tables on the terminal
 
 docs: setup  ## Check that the snippets in README and docs run
 	$(BIN)/pytest tests/docs
+
+wheel: setup  ## Build a wheel that needs no system packages, into dist/, and check it in a clean environment
+	./scripts/build-wheel.sh
+	$(BIN)/python scripts/check_wheel.py dist/qlb-*.whl
 
 setup: .venv/.installed
 
