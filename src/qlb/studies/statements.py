@@ -85,7 +85,7 @@ def grows(*solvers: str) -> Claim:
             for (above, a), (below, b) in pairwise(means[solver].items())
             if not b > a
         ]
-        grown = [f"{solver} grows {_growth(row):.2g} times" for solver, row in means.items()]
+        grown = [f"{solver} grows {_growth(row):.3g} times" for solver, row in means.items()]
         first, *_, last = measured
         return Judgement(
             _listed(means), not falls, _sentence(falls) if falls else _sentence(grown, f" from {first} to {last}")
@@ -101,7 +101,7 @@ def grows_more(solver: str, others: Sequence[str]) -> Claim:
         means = {name: _means(measured, name) for name in (solver, *others)}
         growth = {name: _growth(row) for name, row in means.items()}
         holds = all(growth[solver] > growth[other] for other in others)
-        factors = [f"{name} {factor:.2g} times" for name, factor in growth.items()]
+        factors = [f"{name} {factor:.3g} times" for name, factor in growth.items()]
         return Judgement(_listed(means), holds, _sentence(factors, " from the first row to the last"))
 
     return claim
@@ -113,7 +113,7 @@ def more(row: str, than: str, solvers: Sequence[str]) -> Claim:
     def claim(measured: Measured) -> Judgement:
         pairs = {s: {label: measured[label][s].mean for label in (row, than)} for s in solvers}
         holds = all(means[row] > means[than] for means in pairs.values())
-        ratios = [f"{s} {_ratio(means[row], means[than]):.2g} times" for s, means in pairs.items()]
+        ratios = [f"{s} {_ratio(means[row], means[than]):.3g} times" for s, means in pairs.items()]
         return Judgement(_listed(pairs), holds, _sentence(ratios, f" what it needs in the row {than}"))
 
     return claim
@@ -137,7 +137,7 @@ def alike(solvers: Sequence[str], factor: float) -> Claim:
     def claim(measured: Measured) -> Judgement:
         means = {solver: _means(measured, solver) for solver in solvers}
         spread = {solver: _ratio(max(row.values()), min(row.values())) for solver, row in means.items()}
-        told = [f"{solver} {value:.2g}" for solver, value in spread.items()]
+        told = [f"{solver} {value:.3g}" for solver, value in spread.items()]
         return Judgement(_listed(means), max(spread.values()) <= factor, _sentence(told, " times between the rows"))
 
     return claim
@@ -150,7 +150,8 @@ def fails(solver: str, *rows: str) -> Claim:
         found = {label: measured[label][solver] for label in rows or measured}
         never = [label for label, one in found.items() if not one.failed]
         counts = ", ".join(f"{label}: {one.failed} of {one.steps} steps failed" for label, one in found.items())
-        told = f"Every step converges in {', '.join(never)}." if never else "Steps reach the limit of iterations."
+        shares = [f"{100 * one.failed / one.steps:.2g} % of its steps in {label}" for label, one in found.items()]
+        told = f"Every step converges in {', '.join(never)}." if never else _sentence(shares)
         return Judgement(f"{solver}: {counts}", not never, told)
 
     return claim
@@ -187,9 +188,9 @@ def _means(measured: Measured, solver: str) -> dict[str, float]:
 
 
 def _listed(means: Mapping[str, Mapping[str, float]]) -> str:
-    """As in "QLF: E = 6e3 Pa 185, E = 2e4 Pa 235"."""
+    """As in "QLF: 185 (E = 6e3 Pa), 235 (E = 2e4 Pa)"."""
     rows = (
-        f"{solver}: " + ", ".join(f"{label} {mean:.3g}" for label, mean in row.items()) for solver, row in means.items()
+        f"{solver}: " + ", ".join(f"{mean:.3g} ({label})" for label, mean in row.items()) for solver, row in means.items()
     )
     return "; ".join(rows)
 
