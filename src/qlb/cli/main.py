@@ -308,9 +308,9 @@ class _quiet:  # noqa: N801
 
 def main() -> None:
     """Entry point of the `qlb` command."""
-    show_notes()
     try:
-        app()
+        with show_notes():
+            app()
     except InputError as error:
         errors.print(f"[bold red]error:[/] {_escaped(error)}", soft_wrap=True)
         sys.exit(WRONG_INPUT)

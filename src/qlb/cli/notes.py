@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from rich.markup import escape
 
@@ -15,9 +17,15 @@ class _Notes(logging.Handler):
         errors.print(f"[{style}]note:[/] {escape(record.getMessage())}", soft_wrap=True, highlight=False)
 
 
-def show_notes() -> None:
-    """Print what goes to the logger `qlb` as "note: ..." on standard error, once for each call of the program."""
-    logger = logging.getLogger("qlb")
+@contextmanager
+def show_notes() -> Iterator[None]:
+    """Within it, what goes to the logger `qlb` is printed on standard error as "note: ..."."""
+    logger, notes = logging.getLogger("qlb"), _Notes()
+    level = logger.level
     logger.setLevel(logging.INFO)
-    if not any(isinstance(handler, _Notes) for handler in logger.handlers):
-        logger.addHandler(_Notes())
+    logger.addHandler(notes)
+    try:
+        yield
+    finally:
+        logger.removeHandler(notes)
+        logger.setLevel(level)

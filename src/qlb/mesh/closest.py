@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 INSIDE = -1e-9
 """A barycentric coordinate from which on a point counts as within a tet."""
-CHUNK = 4096
-"""Points that are looked at together, which bounds the memory."""
+PAIRS = 500_000
+"""Of points and cells that are looked at together, which bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -105,13 +105,12 @@ def _candidates(corners: FloatArray, points: FloatArray, reach: FloatArray) -> I
     for label in np.unique(classes):
         members = np.flatnonzero(classes == label)
         tree, radius = cKDTree(centres[members]), radii[members].max() * (1 + 1e-9)
-        for begin in range(0, len(points), CHUNK):
-            some = slice(begin, begin + CHUNK)
+        counts = tree.query_ball_point(points, reach + radius, return_length=True)
+        near = np.flatnonzero(counts)
+        chunks = np.cumsum(counts[near]) // PAIRS
+        for some in np.split(near, np.flatnonzero(np.diff(chunks)) + 1) if len(near) else []:
             lists = tree.query_ball_point(points[some], reach[some] + radius)
-            counts = np.fromiter(map(len, lists), np.int64, len(lists))
-            if counts.any():
-                which = np.repeat(np.arange(begin, begin + len(lists)), counts)
-                yield which, members[np.concatenate(lists).astype(np.int64)]
+            yield np.repeat(some, counts[some]), members[np.concatenate(lists).astype(np.int64)]
 
 
 def point_triangle_distance(points: FloatArray, corners: FloatArray) -> FloatArray:

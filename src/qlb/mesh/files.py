@@ -14,10 +14,10 @@ from qlb.mesh import worker
 from qlb.mesh.child import ChildRefused, ask
 from qlb.mesh.surface import merge_coincident
 
-SECONDS, SECONDS_PER_MEGABYTE = 60.0, 10.0
-"""Reading may take so long, and so much longer for each megabyte of the file."""
-SURFACE_SUFFIXES = worker.TRIMESH + worker.USD
-"""Of formats that hold surfaces only; others may hold tets."""
+SECONDS_TO_START, SECONDS, SECONDS_PER_MEGABYTE = 300.0, 60.0, 10.0
+"""What reads may take so long to start, reading then so long, and so much longer for each megabyte of the file."""
+LARGEST = 1e100
+"""Coordinate [m]: the squares of larger ones are near the end of the range of numbers."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,10 @@ class MeshFile:
         if path.suffix.lower() in worker.USD and find_spec("pxr") is None:
             raise MissingExtra(f'{path} needs usd-core: pip install "qlb[usd]"')
         try:
-            request = {"task": "read", "path": str(path.absolute())}
-            header, arrays = ask(request, {}, seconds=SECONDS + SECONDS_PER_MEGABYTE * 1e-6 * size)
+            request = {"path": str(path.absolute())}
+            ask(request | {"task": "prepare"}, {}, seconds=SECONDS_TO_START)
+            seconds = SECONDS + SECONDS_PER_MEGABYTE * 1e-6 * size
+            header, arrays = ask(request | {"task": "read"}, {}, seconds=seconds)
         except ChildRefused as error:
             raise InputError(f"mesh file {path} cannot be read: {error}") from None
         if arrays["points"].ndim != 2 or arrays["points"].shape[1] != 3:
@@ -77,11 +79,12 @@ class MeshFile:
             raise InputError(f"mesh file {self.path} has no {what}, only {', '.join(self.kinds) or 'nothing'}")
         used, renumbered = np.unique(cells, return_inverse=True)
         positions = self.points[used]
-        bad = ~np.isfinite(positions).all(axis=1)
+        bad = ~(np.abs(positions) < LARGEST).all(axis=1)
         if bad.any():
             first = int(np.argmax(bad))
             raise InputError(
-                f"mesh file {self.path}: node {used[first]} has position {positions[first].tolist()}, must be finite"
+                f"mesh file {self.path}: node {used[first]} has position {positions[first].tolist()}, must be below"
+                f" {LARGEST:g} m"
             )
         return positions, renumbered.reshape(cells.shape).astype(np.int32)
 

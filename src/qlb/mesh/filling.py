@@ -22,16 +22,21 @@ from qlb.mesh.closest import embed
 from qlb.mesh.embedded_surface import EmbeddedSurface
 from qlb.mesh.files import MeshFile, read_surface
 from qlb.mesh.geometry import tet_components
-from qlb.mesh.surface import SurfaceReport, diagonal, merge_coincident, repair
+from qlb.mesh.surface import SurfaceReport, diagonal, merge_coincident, repair, thinned
 from qlb.mesh.tet_mesh import TetMesh
 
 FEWEST, MOST, DEFAULT = 100, 2_000_000, 5000
 CLOSE, ALLOWED = 0.12, 0.25
 """The search ends at a number of tets that is missed by less than the first share; one missed by more than the second
 is said aloud."""
+THINNING = 0.1
+"""Side of the cells in edges, within which vertices become one before fTetWild, whose time goes with their number.
+
+What is thinner than that would vanish in the envelope."""
 RUNS = 5
-FIRST_POWER = 1.6
-"""With which the number of tets goes with 1 / edge, as the first guess; then it is measured."""
+FIRST_SHARE, FIRST_POWER = 0.09, 1.6
+"""The edge, in diagonals, that makes `DEFAULT` tets, and the power of 1 / edge that their number goes with: a first
+guess, then it is measured."""
 SHARES = (1e-3, 0.5)
 """Of a target edge in the diagonal."""
 ENVELOPE = 0.05
@@ -152,7 +157,8 @@ class _Task:
     def run(self, share: float) -> TetMesh:
         """Tets of a target edge that is a share of the diagonal."""
         centre = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
-        arrays = {"vertices": (self.vertices - centre) / self.size, "triangles": self.triangles}
+        vertices, triangles = thinned(self.vertices, self.triangles, THINNING * share * self.size)
+        arrays = {"vertices": (vertices - centre) / self.size, "triangles": triangles}
         with tempfile.TemporaryDirectory(prefix="qlb-") as folder:
             request = {"task": "fill", "edge": share, "epsilon": ENVELOPE * share, "folder": folder}
             try:
@@ -166,7 +172,7 @@ class _Task:
 
     def search(self, wanted: int) -> tuple[float, TetMesh]:
         """About `wanted` tets, and the share; the nearest of a few runs. The number goes about with a power of it."""
-        share, power = 0.075 * (wanted / DEFAULT) ** (-1 / FIRST_POWER), FIRST_POWER
+        share, power = FIRST_SHARE * (wanted / DEFAULT) ** (-1 / FIRST_POWER), FIRST_POWER
         tried: list[tuple[float, float, TetMesh, float]] = []  # miss, log of the number, mesh, share
         for _ in range(RUNS):
             mesh = self.run(share)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,9 @@ from qlb.arrays import BoolArray, FloatArray, IntArray, LongArray
 from qlb.mesh.geometry import SLIVER, longest_edges, parts, triangle_areas
 
 COINCIDENT = 1e-7
-"""Vertices nearer than this share of the diagonal of the bounding box are one: about the rounding of float32."""
+"""Vertices nearer than this share of the diagonal of the bounding box are one: about the rounding of float32.
+
+Some that are up to four times as far apart are, too."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def _count(number: int, what: str) -> str:
 
 
 def merge_coincident(vertices: FloatArray, triangles: npt.NDArray[np.integer]) -> tuple[FloatArray, IntArray]:
-    """The same triangles on vertices (q, 3) of which no two are nearer than `COINCIDENT` of the diagonal.
+    """The same triangles, with vertices (q, 3) nearer than `COINCIDENT` of the diagonal merged.
 
     Each set of coincident vertices becomes the first of them.
     """
@@ -91,14 +94,31 @@ def merge_coincident(vertices: FloatArray, triangles: npt.NDArray[np.integer]) -
     return vertices[first[order]], rank[renumbered][triangles].astype(np.int32)
 
 
-def _coincident(vertices: FloatArray, tolerance: float) -> IntArray:
-    """A label of each vertex, which those within `tolerance` of each other share, shape (q,)."""
-    from scipy.spatial import cKDTree
+def thinned(vertices: FloatArray, triangles: IntArray, cell: float) -> tuple[FloatArray, IntArray]:
+    """A coarser surface, on the means of the vertices in each cell [m] of a grid, for what need not see its details.
 
-    # Many vertices at one place make many pairs, so places come first.
-    places, of_vertex = np.unique(vertices, axis=0, return_inverse=True)
-    pairs = cKDTree(places).query_pairs(tolerance, output_type="ndarray")
-    return parts(len(places), pairs[:, 0], pairs[:, 1])[of_vertex.reshape(-1)]
+    J. Rossignac, P. Borrel (1993), "Multi-resolution 3D approximations for rendering complex scenes".
+    """
+    cells = np.floor((vertices - vertices.min(axis=0)) / cell)
+    _, of_vertex, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    of_vertex = of_vertex.reshape(-1)
+    sums = [np.bincount(of_vertex, weights=vertices[:, k]) for k in range(3)]
+    means = np.stack(sums, axis=1) / count[:, None]
+    kept = of_vertex[triangles].astype(np.int32)
+    return means, kept[sound_triangles(means, kept)]
+
+
+def _coincident(vertices: FloatArray, tolerance: float) -> IntArray:
+    """A label of each vertex, which those within `tolerance` [m] of each other share, shape (q,)."""
+    # Two that are so near share a cell in one of eight grids, shifted by half a cell along each axis. Pairs of near
+    # vertices would be too many where one vertex far away makes all others near.
+    low, cell = vertices.min(axis=0), 2 * tolerance
+    joined = []
+    for shift in product((0.0, 0.5), repeat=3):
+        cells = np.floor((vertices - low) / cell + shift) if cell > 0 else vertices
+        joined.append(np.unique(cells, axis=0, return_index=True, return_inverse=True)[1:])
+    first = np.concatenate([first[of_vertex.reshape(-1)] for first, of_vertex in joined])
+    return parts(len(vertices), np.tile(np.arange(len(vertices)), len(joined)), first)
 
 
 def diagonal(vertices: FloatArray) -> float:

@@ -7,6 +7,7 @@ prints, and ends the process where it meets what it cannot do.
 It imports nothing of qlb, which would make its start slow. A message is a line of JSON, whose "arrays" are name, type
 and shape of the arrays that follow in binary. Requests come on standard input, answers go to standard output:
 
+    {"task": "prepare", "path": ...}                      nothing: imports what reads such a file
     {"task": "read", "path": ...}                         points, tets, triangles, regions; "kinds" of the cells
     {"task": "fill", "edge": ..., "epsilon": ..., "folder": ...} + vertices, triangles      positions, tets
     {"refused": reason}                                   instead of an answer
@@ -19,6 +20,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
@@ -42,19 +44,32 @@ class Refused(Exception):
     """The file is wrong, and why."""
 
 
+def prepare(path: Path) -> tuple[dict[str, Any], Arrays]:
+    """Import what reads a file, which neither its time nor its memory pays for."""
+    import_module("trimesh" if path.suffix.lower() in TRIMESH else "pxr.Usd" if _is_usd(path) else "meshio")
+    return {}, {}
+
+
 def read(path: Path) -> tuple[dict[str, Any], Arrays]:
     """Kinds of cells, and arrays, of a file in any format."""
-    suffix = path.suffix.lower()
-    reader = _read_trimesh if suffix in TRIMESH else _read_usd if suffix in USD else _read_meshio
-    import_module = {_read_trimesh: "trimesh", _read_usd: "pxr.Usd", _read_meshio: "meshio"}[reader]
-    __import__(import_module)  # before memory is counted
+    reader = _read_trimesh if path.suffix.lower() in TRIMESH else _read_usd if _is_usd(path) else _read_meshio
     _limit_memory(SPARE_MEMORY + MEMORY_PER_BYTE * path.stat().st_size)
     try:
         return reader(path)
+    except Refused:
+        raise
     except MemoryError:
         raise Refused("it asks for far more memory than a file of its size can need") from None
+    except (Exception, SystemExit) as error:  # readers raise whatever they stumble over
+        said = " ".join([f"{type(error).__name__}:", *str(error).split()]).removesuffix(":")
+        why = "" if isinstance(error, SystemExit) else f" ({said})"  # meshio has printed why, and exits
+        raise Refused(f"it is damaged, or not what its suffix says{why}") from None
     finally:
         _limit_memory(None)
+
+
+def _is_usd(path: Path) -> bool:
+    return path.suffix.lower() in USD
 
 
 def fill(header: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays]:
@@ -142,7 +157,7 @@ def _read_usd(path: Path) -> tuple[dict[str, Any], Arrays]:
     arrays = _joined(parts)
     arrays["points"] = arrays["points"] * UsdGeom.GetStageMetersPerUnit(stage)
     if UsdGeom.GetStageUpAxis(stage) == "Z":
-        arrays["points"] = arrays["points"][:, [1, 2, 0]]  # a turn: x right, y up
+        arrays["points"] = arrays["points"][:, [0, 2, 1]] * [1.0, 1.0, -1.0]  # a quarter turn about x
     return {"kinds": ["triangle"] if parts else sorted(filter(None, kinds))}, arrays
 
 
@@ -209,8 +224,10 @@ def receive(stream: IO[bytes]) -> tuple[dict[str, Any], Arrays]:
 def answer(header: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays]:
     """What to send back for a request."""
     try:
-        return read(Path(header["path"])) if header["task"] == "read" else fill(header, arrays)
-    except (Exception, SystemExit) as error:  # readers raise whatever they stumble over
+        if header["task"] == "fill":
+            return fill(header, arrays)
+        return {"prepare": prepare, "read": read}[header["task"]](Path(header["path"]))
+    except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         return {"refused": reason[:300] + ("..." if len(reason) > 300 else "")}, {}
 
