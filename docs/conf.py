@@ -17,7 +17,6 @@ release = version = qlb.__version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "directives",
     "mathml",
 ]
@@ -27,8 +26,6 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 default_role = "literal"
 math_numfig = False
-# Pages that come with parts of the package; a part that is not there has no page.
-suppress_warnings = ["toc.empty_glob"]
 exclude_patterns = ["_ext"]
 
 html_theme = "furo"

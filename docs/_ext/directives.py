@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 
-import generated
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.util.docutils import SphinxDirective
+
+import generated
 
 
 class Generated(SphinxDirective):
@@ -22,16 +24,24 @@ class Generated(SphinxDirective):
         make = getattr(generated, f"{self.arguments[0]}_markdown")
         given = " ".join(self.arguments[1:]).split()
         text = make(given) if self.arguments[0] == "api" else make(*given)
-        return self.parse_text_to_nodes(text, allow_section_headings=True)
+        found = self.parse_text_to_nodes(text, allow_section_headings=True)
+        for table in (table for node in found for table in node.findall(nodes.table)):
+            table["classes"].append(f"columns-{len(next(iter(table.findall(nodes.row))))}")
+        return found
 
 
-def _literal_bars(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Docstrings are plain text: |g| is a norm and no substitution, x* no emphasis."""
+def _plain_docstrings(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Docstrings are plain text in Google's form: |g| is a norm and no substitution, x* no emphasis.
+
+    Those of attributes have no form: a colon in them ends no type.
+    """
     lines[:] = [re.sub(r"(?<!`)([|*])", r"\\\1", line) for line in lines]
+    if what not in ("attribute", "property", "data"):
+        lines[:] = GoogleDocstring(lines, Config(), app, what, name, obj, options).lines()
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make the directive known."""
     app.add_directive("generated", Generated)
-    app.connect("autodoc-process-docstring", _literal_bars, priority=100)
+    app.connect("autodoc-process-docstring", _plain_docstrings)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -68,10 +68,10 @@ def scenes_markdown() -> str:
 def materials_markdown() -> str:
     """The table of materials: name in scene files, class, what it is for, whether elements may be inverted."""
     rows = (
-        (f"`{name}`", f"`{kind.__name__}`", _summary(kind), _formula(kind), INVERTED[kind.domain])
+        (f"`{name}`", f"`{kind.__name__}`", f"{_summary(kind)}. {_formula(kind)}", INVERTED[kind.domain])
         for name, kind in MATERIALS.items()
     )
-    return table(("`material.model`", "class", "what", "energy density psi(F) [Pa], source", "inverted elements"), rows)
+    return table(("`material.model`", "class", "what it is, its energy density psi(F) [Pa]", "inverted elements"), rows)
 
 
 def material_keys_markdown() -> str:
@@ -124,7 +124,9 @@ def _parameters(command: click.Command) -> str:
     for parameter in command.params:
         option = parameter.param_type_name == "option"
         names = [*parameter.opts, *parameter.secondary_opts] if option else [(parameter.name or "").upper()]
-        default = "" if parameter.default in (None, False, True, (), []) or callable(parameter.default) else parameter.default
+        default = (
+            "" if parameter.default in (None, False, True, (), []) or callable(parameter.default) else parameter.default
+        )
         text = getattr(parameter, "help", None) or ""
         rows.append((", ".join(f"`{name}`" for name in names), f"`{default}`" if default != "" else "", text))
     return table(("argument", "default", "what"), rows) if rows else ""
@@ -165,7 +167,6 @@ def _group(key: str, model: type[BaseModel], given: Any) -> Iterator[tuple[str, 
             yield from _rows_of({name: _with_default(field, default)}, f"{key}.", [name])
     if model is Contact:
         yield (f"`{key}`", "", "", "", "The other keys of [contact](settings-contact)")
-
 
 
 def _differs(given: BaseModel, key: str) -> bool:

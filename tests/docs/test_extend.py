@@ -1,7 +1,7 @@
 """The pages on how to extend qlb, followed word for word in a copy of the tree: what they promise is there.
 
-Blocks with a caption are files, and are written; lines `$ ...` are commands, and are run. `make setup` stands for a build
-of the compiled module alone, unoptimised and for the lowest SIMD level, which is what a test can wait for.
+Blocks with a caption are files, and are written; lines `$ ...` are commands, and are run. `make setup` stands for a
+build of the compiled module alone, unoptimised and for the lowest SIMD level, which is what a test can wait for.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ class Copy:
             "-DCMAKE_BUILD_TYPE=Debug",
             "-DCMAKE_CXX_FLAGS_DEBUG=-O0",
             "-DQLB_ONE_SIMD_LEVEL=ON",
+            "-DCMAKE_UNITY_BUILD=ON",
             f"-Dnanobind_DIR={cmake_dir}",
             f"-DPython_EXECUTABLE={sys.executable}",
         ]
