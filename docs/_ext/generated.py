@@ -29,10 +29,10 @@ from qlb.solvers import SOLVERS
 INVERTED = {"everywhere": "yes", "unique R": "yes", "det F > 0": "no"}
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A Markdown table; bars within cells are escaped."""
+def table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table; bars within cells are escaped, and what is there twice is written once."""
     head = list(head)
-    lines = [head, ["---"] * len(head), *([cell.replace("|", r"\|") for cell in row] for row in rows)]
+    lines = [head, ["---"] * len(head), *([cell.replace("|", r"\|") for cell in row] for row in dict.fromkeys(rows))]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
@@ -91,11 +91,16 @@ def solvers_markdown() -> str:
     return table(("`solver`", "what"), ((f"`{name}`", _summary(kind)) for name, kind in SOLVERS.items()))
 
 
+def program_markdown() -> str:
+    """What `qlb` is, and its exit status."""
+    return f"{typer.main.get_command(app).help}\n"
+
+
 def commands_markdown() -> str:
     """Every command of `qlb`, its arguments and options."""
     root = typer.main.get_command(app)
     context = click.Context(root, info_name="qlb")
-    parts = [f"{root.help}\n"]
+    parts = []
     for name, command in root.commands.items():  # type: ignore[attr-defined]
         inner = click.Context(command, info_name=name, parent=context)
         usage = re.sub(r"\{(\w+)\}", lambda found: found[1].upper(), " ".join(command.collect_usage_pieces(inner)))
@@ -153,16 +158,18 @@ def _rows_of(fields: Mapping[str, FieldInfo], prefix: str, order: Iterable[str])
             yield (f"`{prefix}{name}`", shown, "", "", "See [the materials](settings-materials)")
         elif typing.get_origin(field.annotation) is tuple:
             yield _row(prefix + name, field)
-            yield from _rows(models[0], f"{prefix}{name}.{ENTRY}.")
+            for model in models:
+                yield from _rows(model, f"{prefix}{name}.{ENTRY}.")
         else:
-            yield from _group(f"{prefix}{name}", models[0], field.default)
+            for model in models:
+                yield from _group(f"{prefix}{name}", model, field.default)
 
 
 def _group(key: str, model: type[BaseModel], given: Any) -> Iterator[tuple[str, ...]]:
     """The keys of a group; of one that many scenes share, only those with a default of its own."""
     shared = model is Contact or (key in Scene.model_fields and Scene.model_fields[key].default != given)
     for name, field in model.model_fields.items():
-        default = getattr(given, name) if isinstance(given, BaseModel) else field.default
+        default = getattr(given, name) if isinstance(given, model) else field.default
         if not shared or default != field.default:
             yield from _rows_of({name: _with_default(field, default)}, f"{key}.", [name])
     if model is Contact:

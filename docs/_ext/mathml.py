@@ -12,7 +12,8 @@ from sphinx.application import Sphinx
 
 def mathml(tex: str, *, block: bool) -> str:
     """A formula; bars of norms stand close to what is between them."""
-    return re.sub(r"<mo[^>]*>([|‖∣])</mo>", r'<mo lspace="0" rspace="0">\1</mo>', tex2mathml(tex, as_block=block))
+    markup = tex2mathml(tex, as_block=block)
+    return re.sub(r"<mo[^>]*>([|\u2016\u2223])</mo>", r'<mo lspace="0" rspace="0">\1</mo>', markup)
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
