@@ -3,9 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
 NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
+WEB := scripts/build-web.sh $(shell find web -type f -not -path '*/node_modules/*')
 FORMATTED := src tests benchmarks examples docs
 
-.PHONY: run test quick lint format stubs bench docs site links setup clean
+.PHONY: run test wheel quick lint format stubs bench docs site links setup clean
 
 run: setup  ## Run the bar; leaves a picture, a plot and a report below runs/
 	$(BIN)/qlb run bar
@@ -21,11 +22,13 @@ lint: setup
 	$(BIN)/ruff check --quiet $(FORMATTED)
 	find native -name '*.?pp' | xargs $(BIN)/clang-format --dry-run --Werror
 	$(BIN)/mypy
+	npm run --prefix web --silent check
 
-format: setup  ## Format Python and C++
+format: setup  ## Format Python, C++ and TypeScript
 	$(BIN)/ruff check --quiet --fix-only $(FORMATTED)
 	$(BIN)/ruff format --quiet $(FORMATTED)
 	find native -name '*.?pp' | xargs $(BIN)/clang-format -i
+	npm run --prefix web --silent format
 
 stubs: setup  ## Write the type stub of the compiled module again
 	$(BIN)/python -m nanobind.stubgen -q -m qlb._native -o src/qlb/_native.pyi
@@ -42,10 +45,15 @@ site: setup  ## Build the site alone; a warning, such as a link within it that l
 links: setup  ## Check links out of the site and the README; needs the network
 	$(BIN)/python -m sphinx -q -b linkcheck docs build/links
 
+wheel: setup  ## Build a wheel that needs no system packages, into dist/, and check it in a clean environment
+	./scripts/build-wheel.sh
+	$(BIN)/python scripts/check_wheel.py dist/qlb-*.whl
+
 setup: .venv/.installed
 
-# An editable install, with CHOLMOD for the tests to compare with; it is made again when native sources or requirements change.
-.venv/.installed: $(NATIVE) scripts/install-system.sh
+# An editable install, with CHOLMOD for the tests to compare with; it is made again when native sources, web sources or
+# requirements change.
+.venv/.installed: $(NATIVE) $(WEB) scripts/install-system.sh
 	./scripts/install-system.sh
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
@@ -55,4 +63,4 @@ setup: .venv/.installed
 	touch $@
 
 clean:
-	rm -rf .venv build
+	rm -rf .venv build web/node_modules src/qlb/results/static

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,3 +10,12 @@ import pytest
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20211110)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def cache_of_meshes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder of this session: tests neither use nor fill that of the user."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("QLB_CACHE", str(folder))
+        yield folder

@@ -12,7 +12,7 @@ from typing import Any
 import click
 import numpy as np
 import typer
-from pydantic import BaseModel
+from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
@@ -23,7 +23,8 @@ from qlb.fields import TimeFunction, Varying
 from qlb.integrators import INTEGRATORS
 from qlb.materials import MATERIALS, Material
 from qlb.scenes import SCENES, Scene
-from qlb.settings import ENTRY, describe_range, nested_models
+from qlb.setting_keys import ENTRY, TAGS, key_fields, nested_models
+from qlb.settings import describe_range
 from qlb.solvers import SOLVERS
 
 INVERTED = {"everywhere": "yes", "unique R": "yes", "det F > 0": "no"}
@@ -79,6 +80,16 @@ def material_keys_markdown() -> str:
     return "\n".join(
         f"### `{name}`: {kind.__name__}\n\n{settings_markdown(kind, 'material.')}" for name, kind in MATERIALS.items()
     )
+
+
+def alternatives_markdown() -> str:
+    """What a mesh, an obstacle or a motion may be, wherever a key holds one."""
+    found = dict(pair for kind in (Scene, *SCENES.values()) for pair in _alternatives(kind))
+    parts = []
+    for name, models in found.items():
+        parts.append(f"### One of several: `{name}`\n")
+        parts += [f"`{_tag(model)}`: {_summary(model)}.\n\n{settings_markdown(model, f'{name}.')}" for model in models]
+    return "\n".join(parts)
 
 
 def integrators_markdown() -> str:
@@ -152,17 +163,49 @@ def _rows_of(fields: Mapping[str, FieldInfo], prefix: str, order: Iterable[str])
         if not models:
             continue
         if all(issubclass(model, Material) for model in models):
-            given = field.default
-            other = [f"{key}: {getattr(given, key):g}" for key in given.model_fields_set if _differs(given, key)]
-            shown = f"`{{{', '.join([f'model: {given.model}', *other])}}}`" if other else f"`{given.model}`"
-            yield (f"`{prefix}{name}`", shown, "", "", "See [the materials](settings-materials)")
-        elif typing.get_origin(field.annotation) is tuple:
+            yield (f"`{prefix}{name}`", _material(field.default), "", "", "See [the materials](settings-materials)")
+            continue
+        is_list = _is_list(name, field)
+        if is_list:
             yield _row(prefix + name, field)
-            for model in models:
-                yield from _rows(model, f"{prefix}{name}.{ENTRY}.")
+        inner = f"{prefix}{name}.{ENTRY}" if is_list else f"{prefix}{name}"
+        if len(models) > 1:
+            kinds = ", ".join(f"`{_tag(model)}`" for model in models)
+            yield (f"`{inner}`", "", "", kinds, "One of several, each with [its own keys](settings-alternatives)")
         else:
-            for model in models:
-                yield from _group(f"{prefix}{name}", model, field.default)
+            yield from _group(inner, models[0], None if is_list else field.default)
+
+
+def _material(given: Any) -> str:
+    """The default of a material: its model, and what of it is no default of that model."""
+    if not isinstance(given, Material):
+        return "`null`"
+    other = [f"{key}: {getattr(given, key):g}" for key in given.model_fields_set if _differs(given, key)]
+    return f"`{{{', '.join([f'model: {given.model}', *other])}}}`" if other else f"`{given.model}`"
+
+
+def _is_list(name: str, field: FieldInfo) -> bool:
+    """Whether a field with models in it holds a list of them: only then the key itself counts as one."""
+    alone = create_model("Alone", **{name: (field.annotation, field)})  # type: ignore[call-overload]
+    return name in key_fields(alone)
+
+
+def _tag(model: type[BaseModel]) -> str:
+    """By what a member of several models is told apart: its tag, or a key that it must have, or what it is."""
+    fields = model.model_fields
+    tag = next((str(fields[tag].default) for tag in TAGS if tag in fields), None)
+    required = (name for name, field in fields.items() if field.is_required())
+    return tag or next(required, _summary(model).lower())
+
+
+def _alternatives(model: type[BaseModel]) -> Iterator[tuple[str, tuple[type[BaseModel], ...]]]:
+    """Each key below `model` that holds one of several models, materials apart, with these."""
+    for name, field in model.model_fields.items():
+        models = nested_models(field.annotation)
+        if len(models) > 1 and not issubclass(models[0], Material):
+            yield f"{name}.{ENTRY}" if _is_list(name, field) else name, tuple(models)
+        for inner in models:
+            yield from _alternatives(inner)
 
 
 def _group(key: str, model: type[BaseModel], given: Any) -> Iterator[tuple[str, ...]]:

@@ -31,3 +31,11 @@ def vectors(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArr
         where = f" of node {bad[0][0]}" if array.ndim > 1 else ""
         raise InputError(f"{name}{where} is {array[bad[0][0]] if array.ndim > 1 else array}, must be finite")
     return np.array(np.broadcast_to(array, shape), order="C")
+
+
+def whole_number(name: str, value: object, low: int, high: int) -> int:
+    """`value` as an int, which must be a whole number from `low` to `high`."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not low <= value <= high:  # type: ignore[operator]
+        raise InputError(f"{name} {value!r} is out of range: a whole number, {low} to {high}")
+    return int(value)  # type: ignore[call-overload, no-any-return]

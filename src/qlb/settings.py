@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Self, TypeVar, get_args, get_origin
+from pathlib import Path
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
     PlainSerializer,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
 )
 from pydantic._internal._model_construction import ModelMetaclass
-from pydantic.fields import FieldInfo
 from pydantic_core import PydanticSerializationError
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
 from qlb.fields import Expression, Function, RegionTable, TimeFunction, Varying
 from qlb.mesh.tet_mesh import TetMesh
+from qlb.setting_keys import setting_error
 
 
 def plain(value: Any) -> Any:
@@ -33,17 +35,40 @@ def plain(value: Any) -> Any:
     if callable(value):
         name = getattr(value, "__name__", type(value).__name__)
         raise InputError(f"the function {name} cannot be written to a scene file; use expressions")
+    if isinstance(value, Path):
+        return str(value.absolute())
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-PerElement = Annotated[float | FloatArray | Varying, PlainSerializer(plain, when_used="json")]
+def _path(path: Path) -> Path:
+    if "\0" in str(path) or max(map(len, path.parts), default=0) > LONGEST_NAME:
+        raise InputError(f"{str(path)[:60]!r} is no name of a file")
+    return path
+
+
+FilePath = Annotated[Path, AfterValidator(_path), PlainSerializer(plain, when_used="json")]
+"""A file. In a scene file it is relative to that file; it is written as absolute."""
+
+_NUMBER = {"type": "number"}
+_PER_ELEMENT: dict[str, Any] = {
+    "anyOf": [
+        _NUMBER,
+        {"type": "string"},
+        {"type": "array", "items": _NUMBER},
+        {"type": "object", "patternProperties": {"^(-?[0-9]+|default)$": _NUMBER}, "additionalProperties": False},
+    ]
+}
+
+PerElement = Annotated[
+    float | FloatArray | Varying, PlainSerializer(plain, when_used="json"), WithJsonSchema(_PER_ELEMENT)
+]
 """A value in each element: one number for all, an array (m,), a table by region {1: 2e4, "default": 5e4}, an expression
 of the rest position such as "2e4 * (1 + x)", or a function of the elements' centroids (m, 3) [m] that gives (m,)."""
 
 T = TypeVar("T", bound="Settings")
 
-ENTRY = "N"
-"""Stands for the number of an entry in the keys of a list."""
+LONGEST_NAME = 255
+"""Characters of a part of a path."""
 
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
@@ -83,7 +108,7 @@ class _RaisesInputError(ModelMetaclass):
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as error:
-            raise InputError(_one_line(cls, error)) from None  # type: ignore[arg-type]
+            raise setting_error(cls, error) from None  # type: ignore[arg-type]
 
 
 class Settings(BaseModel, metaclass=_RaisesInputError):
@@ -97,7 +122,7 @@ class Settings(BaseModel, metaclass=_RaisesInputError):
         try:
             return cls.model_validate(dict(data))
         except ValidationError as error:
-            raise InputError(_one_line(cls, error)) from None
+            raise setting_error(cls, error) from None
 
     def model_dump(self, **options: Any) -> dict[str, Any]:
         """As pydantic's. Raises `InputError` for what plain data cannot hold, such as a Python function."""
@@ -274,88 +299,3 @@ def _satisfies(name: str, numbers: FloatArray | np.float64, limit: float) -> Any
             "lt": np.less,
             "le": np.less_equal,
         }[name](numbers, limit)
-
-
-def _one_line(model: type[BaseModel], error: ValidationError) -> str:
-    """The first problem of a ValidationError in one line, and how many there are."""
-    problems = error.errors()
-    first = next(
-        (p for p in problems if p["type"] == "extra_forbidden"), problems[0]
-    )  # a misspelt key is a missing one
-    key, beside = _locate(model, first["loc"])
-    if first["type"] == "extra_forbidden":
-        text = unknown_key(key, beside)
-    elif first["type"] == "missing":
-        text = f"{key} is missing"
-    elif first["type"] == "model_type":
-        text = f"{key} = {_short(first['input'])} must hold keys and values"
-    elif first["type"] == "union_tag_invalid":
-        context = first["ctx"]
-        options = context["expected_tags"].replace("'", "")
-        text = f"{key}.model: {context['tag']!r} is not known: must be one of {options}"
-    else:
-        message = first["msg"].removeprefix("Value error, ")
-        own_words = first["type"] == "value_error"
-        text = f"{key}: {message}" if own_words else f"{key} = {_short(first['input'])}: {message}"
-    more = len(problems) - 1
-    return text if more == 0 else f"{text} (and {more} more)"
-
-
-def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, list[str]]:
-    """The dotted key of an error's location, and the keys that are valid beside it.
-
-    Left out are the tags that pydantic puts into a location for the member of a union.
-    """
-    parts: list[str] = []
-    members, beside = [model], [model]
-    for part in location:
-        if isinstance(part, int):  # an entry of a list
-            parts.append(str(part))
-            continue
-        tagged = [m for m in members if "model" in m.model_fields and m.model_fields["model"].default == part]
-        if tagged and not any(part in m.model_fields for m in members):
-            members = tagged
-            continue
-        beside = members
-        fields = [m.model_fields[str(part)] for m in members if part in m.model_fields]
-        members = nested_models(fields[0].annotation) if fields else []
-        parts.append(str(part))
-    prefix = "".join(f"{part}." for part in parts[:-1])
-    return ".".join(parts), [prefix + name for m in beside for name in m.model_fields]
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def unknown_key(key: str, valid: Iterable[str]) -> str:
-    """The error for a key that is not one of `valid`, with the nearest that is."""
-    valid = list(valid)
-    near = difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(valid)}"
-    return f"unknown key '{key}'; {hint}"
-
-
-def key_fields(model: type[BaseModel], prefix: str = "") -> dict[str, FieldInfo]:
-    """Every key of a settings model, dotted, with its field: `{"mesh.size": ..., "step": ...}`.
-
-    Where a key holds one of several models, such as a material, the keys of all are there. Where it holds a list of
-    them, it is there itself, and the keys of its entries with `ENTRY` for their number.
-    """
-    fields: dict[str, FieldInfo] = {}
-    for name, field in model.model_fields.items():
-        inner = nested_models(field.annotation)
-        is_list = get_origin(field.annotation) is tuple and bool(inner)
-        for member in inner:
-            fields |= key_fields(member, f"{prefix}{name}.{ENTRY}." if is_list else f"{prefix}{name}.")
-        if is_list or not inner:
-            fields[prefix + name] = field
-    return fields
-
-
-def nested_models(annotation: Any) -> list[type[BaseModel]]:
-    """The settings models that a field can hold: one, the members of a union, or none."""
-    if isinstance(annotation, type):
-        return [annotation] if issubclass(annotation, BaseModel) else []
-    return [model for argument in get_args(annotation) for model in nested_models(argument)]

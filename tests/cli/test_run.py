@@ -241,7 +241,7 @@ def test_a_run_with_contact_shows_it(qlb, tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert 0 < summary["minimum_distance"] < summary["contact"]["dhat"]
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Contacts and the smallest distance" in page
+    assert '"contact":{"steps":[1,2' in page
     assert f"{summary['minimum_distance']:.4g} m" in page
     status, out, _ = qlb("run", "bar", *SMALL, "--out", "bar", "--no-picture")
     assert "contact.png" not in out

@@ -52,7 +52,10 @@ class Copy:
             f"-Dnanobind_DIR={cmake_dir}",
             f"-DPython_EXECUTABLE={sys.executable}",
         ]
-        for command in (["cmake", "-S", ".", "-B", "build", "-G", "Ninja", *options], ["ninja", "-C", "build"]):
+        for command in (
+            ["cmake", "-S", ".", "-B", "build", "-G", "Ninja", *options],
+            ["ninja", "-C", "build", "_native"],
+        ):
             done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stdout[-4000:] + done.stderr
         (module,) = (self.folder / "build").glob("_native*.so")

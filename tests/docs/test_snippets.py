@@ -51,7 +51,7 @@ def test_commands(snippet, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("snippet", blocks("yaml"))
 def test_parts_of_scene_files(snippet, tmp_path):
-    (tmp_path / "scene.yaml").write_text(f"scene: bar\n{snippet}")
+    (tmp_path / "scene.yaml").write_text(snippet if "bodies:" in snippet else f"scene: bar\n{snippet}")
     load_scene(str(tmp_path / "scene.yaml")).build()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,12 +25,14 @@ class Page(HTMLParser):
         self.links: list[str] = []
         self.sources: list[str] = []
         self.text = ""
+        self.scripts: list[str] = []
         self.feed(path.read_text(encoding="utf-8"))
         self.close()
         assert self.open == []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
+        self.scripts += [""] if tag == "script" else []
         values = dict(attrs)
         self.links += [str(values["href"])] if "href" in values else []
         self.sources += [str(values["src"])] if "src" in values else []
@@ -40,7 +43,16 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        self.text += data
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1] += data
+        else:
+            self.text += data
+
+
+@pytest.fixture
+def without_scripts(tmp_path, monkeypatch):
+    """As where qlb was built without npm."""
+    monkeypatch.setattr("qlb.results.page.scripts.STATIC", tmp_path / "static")
 
 
 def test_finish_run_makes_everything(make_run, monkeypatch):
@@ -50,10 +62,12 @@ def test_finish_run_makes_everything(make_run, monkeypatch):
     assert list(files) == ["picture", "iterations", "residuals", "seconds", "report"]
     assert all(path.is_file() for path in files.values())
     page = Page(files["report"])
-    assert len(page.sources) == 4
-    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
-    assert "script" not in page.tags
-    assert all((run.directory / link).exists() for link in page.links)
+    assert [source.split(",")[0] for source in page.sources] == ["data:image/png;base64"]
+    content, *scripts = page.scripts
+    assert len(scripts) == 2
+    animation = json.loads(content)["animations"][0]
+    assert animation["chunks"][0]["steps"] == [0, 1, 2, 3]
+    assert all((run.directory / link).exists() for link in page.links if not link.startswith("data:"))
     assert "Converged: all 3 steps." in page.text
     assert "material.young" in page.text
     assert "20000" in page.text
@@ -64,11 +78,13 @@ def test_a_page_shows_values_as_they_are(make_run):
     evil = '<script>alert(1)</script> & "quotes" {{ 7 * 7 }} ünï'
     run = make_run(scene={"scene": evil, evil: [evil]})
     path = finish_run(run.directory, picture=False)["report"]
-    assert "<script" not in path.read_text(encoding="utf-8")
+    assert "<script>alert" not in path.read_text(encoding="utf-8")
     page = Page(path)
     assert page.text.count(evil) >= 4
+    assert len(page.scripts) == 3
+    assert json.loads(page.scripts[0])["charts"][0]["label"].startswith(evil)
     comparison = Page(write_comparison({evil: run}, [{"solver": evil, "note": evil}], run.directory.parent))
-    assert "script" not in comparison.tags
+    assert len(comparison.scripts) == 3
     assert comparison.text.count(evil) >= 4
 
 
@@ -77,16 +93,27 @@ def test_without_pyvista_the_report_says_so(make_run, monkeypatch):
     run = make_run()
     files = finish_run(run.directory)
     assert "picture" not in files
-    assert 'Left out: a picture needs pyvista: pip install "qlb[view]"' in Page(files["report"]).text
+    assert 'The run, left out: a picture needs pyvista: pip install "qlb[view]"' in Page(files["report"]).text
 
 
-def test_a_report_holds_the_images_that_are_there(make_run):
+def test_without_scripts_a_report_shows_pictures_and_says_so(make_run, without_scripts, tmp_path):
+    run = make_run()
+    page = Page(finish_run(run.directory, picture=False)["report"])
+    assert "script" not in page.tags
+    assert len(page.sources) == 3
+    assert "built without the scripts of the page" in page.text
+    comparison = Page(write_comparison({"QLA": run}, [{"solver": "QLA"}], tmp_path))
+    assert len(comparison.sources) == 1
+    assert "built without the scripts of the page" in comparison.text
+
+
+def test_a_report_holds_the_images_that_are_there(make_run, without_scripts):
     run = make_run()
     assert Page(write_report(run)).sources == []
     plot_residuals(run, run.directory / "residuals.png")
     page = Page(write_report(run, {"picture": "no paint"}))
     assert len(page.sources) == 1
-    assert "Left out: no paint" in page.text
+    assert "left out: no paint" in page.text
 
 
 def test_failed_steps_are_named_with_reasons(make_run):
@@ -129,11 +156,11 @@ def test_a_comparison_links_to_its_reports(make_run, tmp_path):
         finish_run(run.directory, picture=False)
     rows = [{"solver": name, "iterations_mean": 7.25, "difference": None} for name in runs]
     page = Page(write_comparison(runs, rows, tmp_path))
-    assert page.links == ["ND/report.html", "QLB%20100%25/report.html"]
+    assert page.links[1:] == ["ND/report.html", "QLB%20100%25/report.html"]
     assert "iterations, mean" in page.text
     assert "7.25" in page.text
     assert "Converged: all steps of all runs." in page.text
-    assert len(page.sources) == 1
+    assert [animation["label"] for animation in json.loads(page.scripts[0])["animations"]] == list(runs)
 
 
 def test_a_comparison_needs_runs(tmp_path):

@@ -8,7 +8,8 @@ from scipy.integrate import quad
 
 import qlb
 from qlb import shapes
-from qlb.shapes.topology import is_closed_surface, pieces
+from qlb.mesh.geometry import tet_components
+from qlb.shapes.topology import is_closed_surface
 from tests.shapes.surfaces import dihedral_angles
 
 
@@ -97,5 +98,5 @@ def test_surfaces_that_touch_at_an_edge_or_a_node_are_not_closed():
     assert is_closed_surface(qlb.TetMesh(corners, [[0, 1, 2, 3]]))
     assert not is_closed_surface(edge)
     assert not is_closed_surface(node)
-    assert pieces(edge) == pieces(node) == 2
-    assert pieces(qlb.TetMesh.box((1, 1, 1), cells=(2, 1, 1))) == 1
+    assert tet_components(edge.tets) == tet_components(node.tets) == 2
+    assert tet_components(qlb.TetMesh.box((1, 1, 1), cells=(2, 1, 1)).tets) == 1

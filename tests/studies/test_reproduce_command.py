@@ -11,7 +11,7 @@ import time
 import pytest
 
 from qlb.cli.main import main
-from qlb.studies import reproduce_processes
+from qlb.studies import processes
 
 TINY = ["--set", "mesh.cells=4,1,1", "--steps", "3", "--processes", "2"]
 
@@ -44,14 +44,14 @@ def test_prints_a_line_for_each_case_and_a_table(command, tmp_path):
 
 
 def test_wrong_input_is_one_line(command):
-    for arguments in (["7"], ["1", "--processes", "0"], ["1", "--set", "solver=ND"]):
+    for arguments in (["11"], ["1", "--processes", "0"], ["1", "--set", "solver=ND"]):
         status, out, err = command(*arguments)
         assert (status, out, len(err.splitlines())) == (2, "", 1)
 
 
 @pytest.mark.slow
 def test_a_crash_gives_status_1(command, monkeypatch):
-    monkeypatch.setattr(reproduce_processes, "WORKER", (sys.executable, "-c", "raise SystemExit(3)"))
+    monkeypatch.setattr(processes, "WORKER", (sys.executable, "-c", "raise SystemExit(3)"))
     status, out, err = command("2", *TINY)
     assert status == 1
     assert "crashed: bar-default-ND: exit status 3" in err

@@ -51,12 +51,15 @@ class Placement:
         """The placed mesh; `mesh` itself where nothing changes."""
         if self.scale == 1 and not any(self.rotation) and not any(self.translation):
             return mesh
-        x = mesh.positions
-        if self.scale != 1 or any(self.rotation):
-            origin = centre_of_volume(mesh) if self.origin is None else np.asarray(self.origin)
-            x = origin + self.scale * (x - origin) @ _matrix(self.rotation).T
-        placed = TetMesh(x + np.asarray(self.translation), mesh.tets, regions=mesh.regions)
+        placed = TetMesh(self.moved(mesh.positions, centre_of_volume(mesh)), mesh.tets, regions=mesh.regions)
         return placed.with_surface(mesh.surface)
+
+    def moved(self, x: FloatArray, centre: FloatArray) -> FloatArray:
+        """Points `x` (n, 3) [m] where they are placed; `centre` (3,) [m] stands in for an origin that is not given."""
+        if self.scale != 1 or any(self.rotation):
+            origin = centre if self.origin is None else np.asarray(self.origin)
+            x = origin + self.scale * (x - origin) @ _matrix(self.rotation).T
+        return np.asarray(x + np.asarray(self.translation))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,11 @@ import numpy.typing as npt
 
 from qlb.arrays import FloatArray, IntArray, vectors
 from qlb.errors import InputError
-from qlb.mesh.files import read_triangles
-from qlb.mesh.geometry import triangle_areas
+from qlb.mesh.files import read_surface
+from qlb.mesh.geometry import SLIVER, longest_edges, triangle_areas
 
 if TYPE_CHECKING:
     from qlb.system.motions import Motion
-
-# A triangle counts as degenerate when its area is below this fraction of its longest edge squared.
-SLIVER = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +57,12 @@ class Obstacle:
 
     @classmethod
     def read(cls, path: str | Path, *, motion: Motion | None = None, name: str = "") -> Self:
-        """Read the triangles of a file in any format that meshio knows (OBJ, STL, PLY, ...); quads are cut in two.
-
-        Vertices that no triangle uses are dropped.
+        """Read the triangles of a surface file (OBJ, STL, PLY, glTF, USD, ...); see `qlb.mesh.read_surface`.
 
         Raises:
             InputError: the file is missing, unreadable, has no triangles, or fails the checks of `Obstacle`.
         """
-        return cls(*read_triangles(Path(path)), motion=motion, name=name)
+        return cls(*read_surface(path), motion=motion, name=name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +140,7 @@ def _check_triangles(where: str, vertices: FloatArray, triangles: npt.NDArray[np
     if twice.any():
         t = int(np.argmax(twice))
         raise InputError(f"triangle {t} of {where} names a vertex twice: {triangles[t].tolist()}, all must differ")
-    corners = vertices[triangles]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = longest_edges(vertices, triangles)
     area = triangle_areas(vertices, triangles)
     flat = area <= SLIVER * longest**2
     if flat.any():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from qlb.cli.notes import show_notes
 from qlb.cli.output import console, errors, print_comparison, print_outcome
 from qlb.cli.progress import Interrupt, StepReporter
 from qlb.errors import InputError, QlbError
@@ -31,7 +32,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file")]
+SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file (YAML, TOML)")]
 SetOption = Annotated[
     list[str], typer.Option("--set", "-s", metavar="KEY=VALUE", help="Change a scene key; may be repeated")
 ]
@@ -39,9 +40,12 @@ StepsOption = Annotated[int | None, typer.Option(help="Number of time steps")]
 IntegratorOption = Annotated[str | None, typer.Option(help=" | ".join(INTEGRATORS))]
 SolverOption = Annotated[str | None, typer.Option(help=" | ".join(SOLVERS))]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; all that the process may use by default")]
+EXPORT_FORMATS = ("vtkhdf", "vtu", "usd", "glb", "obj", "ply", "mp4", "gif")
 OutOption = Annotated[Path | None, typer.Option(help="Where to write; by default the next free runs/NAME-001")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in the output folder")]
 PictureOption = Annotated[bool, typer.Option(help="Render the picture of chosen frames")]
+LiveOption = Annotated[bool, typer.Option("--live", help="Show the run in a browser as it goes; prints where")]
+RunArgument = Annotated[Path, typer.Argument(help="A run directory")]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="One line per step")]
 
 
@@ -57,16 +61,22 @@ def run(
     overwrite: OverwriteOption = False,
     verbose: VerboseOption = False,
     picture: PictureOption = True,
+    live: LiveOption = False,
 ) -> None:
     """Run a scene; leave frames, statistics, a plot, a picture and a report."""
+    from qlb.cli.live import shown_live
     from qlb.studies import run_scene
 
     changes = {"steps": steps, "solver": solver, "integrator": integrator, "threads": threads}
     settings = load_scene(scene, [*set_, *_overrides(changes)])
     directory = out or _free_directory(scene)
-    with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
-        outcome = run_scene(settings, directory, overwrite=overwrite, on_step=reporter, stop=interrupt)
-    raise typer.Exit(_finish(outcome, picture=picture))
+    with shown_live(live) as on_start:
+        with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
+            outcome = run_scene(
+                settings, directory, overwrite=overwrite, on_start=on_start, on_step=reporter, stop=interrupt
+            )
+        status = _finish(outcome, picture=picture)
+    raise typer.Exit(status)
 
 
 @app.command()
@@ -75,14 +85,18 @@ def resume(
     steps: Annotated[int | None, typer.Option(help="Steps in all; by default as many as the scene says")] = None,
     verbose: VerboseOption = False,
     picture: PictureOption = True,
+    live: LiveOption = False,
 ) -> None:
     """Go on from the last finished step of a run, to the same bits as if it had never been broken off."""
+    from qlb.cli.live import shown_live
     from qlb.studies import resume_run, scene_of
 
     settings = scene_of(directory, steps)
-    with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
-        outcome = resume_run(directory, steps=steps, on_step=reporter, stop=interrupt)
-    raise typer.Exit(_finish(outcome, picture=picture))
+    with shown_live(live) as on_start:
+        with Interrupt() as interrupt, StepReporter("", settings.steps, verbose=verbose) as reporter:
+            outcome = resume_run(directory, steps=steps, on_start=on_start, on_step=reporter, stop=interrupt)
+        status = _finish(outcome, picture=picture)
+    raise typer.Exit(status)
 
 
 @app.command()
@@ -148,6 +162,45 @@ def reproduce(
 
 
 @app.command()
+def mesh(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="A file of tets, or of a surface to fill with them")],
+    target: Annotated[
+        Path | None, typer.Argument(metavar="[OUT]", help="Where to write tets; the suffix says how")
+    ] = None,
+    edge: Annotated[float | None, typer.Option(help="Target edge length [m], after scaling")] = None,
+    tets: Annotated[int | None, typer.Option(help="Or: about how many tets [default: 5000]")] = None,
+    scale: Annotated[float | None, typer.Option(help="Multiply all lengths")] = None,
+    height: Annotated[float | None, typer.Option(help="Or: scale to this height along y [m]")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT")] = False,
+) -> None:
+    """Look at a mesh, fill a surface with tets, or write tets in another format."""
+    from qlb.cli.mesh import mesh_file
+
+    mesh_file(source, target, edge=edge, tets=tets, scale=scale, height=height, overwrite=overwrite)
+
+
+@app.command()
+def sweep(
+    scene: SceneArgument,
+    set_: Annotated[
+        list[str],
+        typer.Option("--set", "-s", metavar="KEY=VALUE,...", help="Values of a key; [1,2] in brackets is one"),
+    ] = [],  # noqa: B006
+    steps: StepsOption = None,
+    out: OutOption = None,
+    processes: Annotated[int | None, typer.Option(help="Runs at a time; by default one for each CPU")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers run them")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Run everything in the output folder again")] = False,
+) -> None:
+    """Run a scene with every combination of values; leave one table. The same call again goes on."""
+    from qlb.cli.sweep import run_sweep
+
+    directory = out or Path("runs") / f"{Path(scene).stem}-sweep"
+    changes = _overrides({"steps": steps})
+    raise typer.Exit(run_sweep(scene, set_, changes, directory, processes, scheduler, overwrite=overwrite))
+
+
+@app.command()
 def scenes(
     show: Annotated[str | None, typer.Option(help="Print this scene as a file to start from")] = None,
 ) -> None:
@@ -162,12 +215,57 @@ def scenes(
 
 
 @app.command()
-def report(directory: Annotated[Path, typer.Argument(help="A run directory")]) -> None:
+def schema() -> None:
+    """Print the JSON Schema of scene files, for editors."""
+    import json
+
+    from qlb.scenes.schema import scene_schema
+
+    sys.stdout.write(json.dumps(scene_schema(), indent=1) + "\n")
+
+
+@app.command()
+def report(
+    directory: RunArgument,
+    megabytes: Annotated[
+        float, typer.Option(help="Size of the page at most, about; frames and vertices are thinned out", min=3.0)
+    ] = 15.0,
+) -> None:
     """Write plots, picture and report of a run again."""
     from qlb.results import Run, finish_run
 
     summary = Run(directory).summary
-    print_outcome(summary, finish_run(directory))
+    print_outcome(summary, finish_run(directory, most_bytes=int(1e6 * megabytes)))
+
+
+@app.command()
+def view(
+    directory: RunArgument,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser")] = True,
+) -> None:
+    """Open the report of a run, made again where it is older than the run, and print where it lies."""
+    from qlb.cli.view import view
+
+    view(directory, show=open_)
+
+
+@app.command()
+def export(
+    directory: Annotated[Path, typer.Argument(help="A run directory")],
+    format_: Annotated[str | None, typer.Option("--format", help=" | ".join(EXPORT_FORMATS))] = None,
+    out: Annotated[Path | None, typer.Option(help="A file or a folder; DIRECTORY/exports by default")] = None,
+    steps: Annotated[str, typer.Option(metavar="A:B:C", help="Every C-th frame of steps A to B; or one step")] = "",
+    volume: Annotated[bool | None, typer.Option("--volume/--surface", help="vtkhdf, vtu: tets or surface")] = None,
+    turntable: Annotated[bool | None, typer.Option("--turntable", help="mp4, gif: go around once")] = None,
+    fps: Annotated[float | None, typer.Option(help="mp4, gif: images a second")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="mp4, gif: pixels, such as 1280x720")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier export")] = False,
+) -> None:
+    """Write a run for ParaView, Blender, Houdini, browsers or as a video."""
+    from qlb.cli.export import export_directory
+
+    options = {"volume": volume, "turntable": turntable, "fps": fps, "size": size}
+    export_directory(directory, out, format_, steps, overwrite=overwrite, options=options)
 
 
 @app.command()
@@ -211,7 +309,8 @@ class _quiet:  # noqa: N801
 def main() -> None:
     """Entry point of the `qlb` command."""
     try:
-        app()
+        with show_notes():
+            app()
     except InputError as error:
         errors.print(f"[bold red]error:[/] {_escaped(error)}", soft_wrap=True)
         sys.exit(WRONG_INPUT)

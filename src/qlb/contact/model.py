@@ -14,6 +14,7 @@ from qlb.arrays import FloatArray, IntArray
 from qlb.bodies import Plane
 from qlb.contact.settings import Contact
 from qlb.errors import InputError, QlbWarning
+from qlb.setting_keys import SettingError
 
 DHAT_OF_EDGE = 0.1
 CREEP = 1e-3  # friction_velocity as a part of the bodies' extent a second
@@ -183,12 +184,14 @@ def _tables(settings: Contact, around: Surroundings) -> tuple[FloatArray, np.nda
     for a, b in combinations_with_replacement(range(count), 2):
         allowed[a, b] = allowed[b, a] = a < around.bodies and (a != b or settings.self_contact)
     for k, pair in enumerate(settings.pairs):
+        key = f"contact.pairs.{k}"
         for name in pair.between:
             if name not in names:
-                raise InputError(f"contact.pairs.{k}: {name!r} is not known: must be one of {', '.join(names)}")
+                known = f"must be one of {', '.join(names)}"
+                raise SettingError(key, f"{key}: {name!r} is not known: {known}")
         a, b = (names.index(name) for name in pair.between)
         if min(a, b) >= around.bodies:
-            raise InputError(f"contact.pairs.{k}: neither {names[a]!r} nor {names[b]!r} is a body")
+            raise SettingError(key, f"{key}: neither {names[a]!r} nor {names[b]!r} is a body")
         allowed[a, b] = allowed[b, a] = pair.collide
         if pair.friction is not None:
             friction[a, b] = friction[b, a] = pair.friction

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
@@ -29,10 +29,13 @@ def _direction(value: Any) -> Any:
     return value
 
 
+_TRIPLE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+
 Direction = Annotated[
     tuple[float, float, float] | VectorExpression | FloatArray | Callable[[FloatArray], FloatArray],
     BeforeValidator(_direction),
     PlainSerializer(plain, when_used="json"),
+    WithJsonSchema({"type": "array", "items": {"anyOf": [{"type": ["number", "string"]}, _TRIPLE]}, "minItems": 1}),
 ]
 
 
@@ -72,7 +75,8 @@ class Fibres(Settings):
         if directions.shape not in ((3,), (count, 3)):
             raise InputError(f"fibre directions have shape {directions.shape}, must be (3,) or ({count}, 3)")
         directions = np.broadcast_to(directions, (count, 3))
-        length = np.linalg.norm(directions, axis=1)
+        with np.errstate(over="ignore"):
+            length = np.linalg.norm(directions, axis=1)
         bad = ~(np.isfinite(length) & (length > 0))
         if bad.any():
             e = int(np.argmax(bad))

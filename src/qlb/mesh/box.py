@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from itertools import permutations
+from math import prod
 
 import numpy as np
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.errors import InputError
 from qlb.mesh.geometry import signed_volumes
+
+MOST_TETS = 2e7
+"""More fit no workstation: a million take some 4 GiB."""
 
 
 def kuhn_box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[FloatArray, IntArray]:
@@ -23,10 +27,14 @@ def kuhn_box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> t
     """
     if len(size) != 3 or not all(np.isfinite(s) and s > 0 for s in size):
         raise InputError(f"box size {tuple(size)} is out of range: three lengths > 0 m")
-    if len(cells) != 3 or not all(np.isfinite(c) and int(c) == c and c >= 1 for c in cells):
+    # Some whole numbers are too large for floats.
+    wanted = np.array([c if c == np.inf else min(c, MOST_TETS) for c in cells], dtype=np.float64)
+    if len(wanted) != 3 or not all(np.isfinite(wanted) & (np.floor(wanted) == wanted) & (wanted >= 1)):
         raise InputError(f"box cells {tuple(cells)} are out of range: three whole numbers >= 1")
 
-    counts = [int(c) for c in cells]
+    counts = [int(c) for c in wanted]
+    if 6 * prod(counts) > MOST_TETS:
+        raise InputError(f"box cells {tuple(cells)} make too many tets, must be at most {MOST_TETS:.3g}")
     axes = [np.linspace(0.0, length, count + 1) for length, count in zip(size, counts, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])

@@ -1,76 +1,128 @@
-"""Reading meshes from files, through meshio."""
+"""Reading mesh files: tetrahedra through meshio, surfaces through trimesh, OpenUSD and meshio."""
 
 from __future__ import annotations
 
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from qlb.arrays import FloatArray, IntArray, LongArray
-from qlb.errors import InputError
+from qlb.errors import InputError, MissingExtra
+from qlb.mesh import worker
+from qlb.mesh.child import ChildRefused, ask
+from qlb.mesh.surface import merge_coincident
 
-# Cell data that hold the region of each tet, the first that a file has: our own, gmsh's, Medit's.
-REGION_DATA = ("region", "gmsh:physical", "medit:ref")
+SECONDS_TO_START, SECONDS, SECONDS_PER_MEGABYTE = 300.0, 60.0, 10.0
+"""What reads may take so long to start, reading then so long, and so much longer for each megabyte of the file."""
+LARGEST = 1e100
+"""Coordinate [m]: the squares of larger ones are near the end of the range of numbers."""
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """What a file holds. Indices are within the points."""
+
+    path: Path
+    points: FloatArray
+    """[m], shape (n, 3); some may belong to nothing"""
+    tets: LongArray
+    """shape (m, 4)"""
+    triangles: LongArray
+    """those of the file (t, 3), quads cut in two; not the boundary of the tets"""
+    regions: LongArray | None
+    """of each tet, shape (m,), or None"""
+    kinds: tuple[str, ...]
+    """of cells, as the format calls them"""
+
+    @staticmethod
+    def read(path: str | Path) -> MeshFile:
+        """Read a file in any format.
+
+        Raises:
+            InputError: the file is missing, empty or cannot be read; an index is out of range.
+            MissingExtra: a USD file, and usd-core is not installed.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise InputError(f"mesh file {path} does not exist")
+        size = path.stat().st_size
+        if size == 0:
+            raise InputError(f"mesh file {path} is empty")
+        if path.suffix.lower() in worker.USD and find_spec("pxr") is None:
+            raise MissingExtra(f'{path} needs usd-core: pip install "qlb[usd]"')
+        try:
+            request = {"path": str(path.absolute())}
+            ask(request | {"task": "prepare"}, {}, seconds=SECONDS_TO_START)
+            seconds = SECONDS + SECONDS_PER_MEGABYTE * 1e-6 * size
+            header, arrays = ask(request | {"task": "read"}, {}, seconds=seconds)
+        except ChildRefused as error:
+            raise InputError(f"mesh file {path} cannot be read: {error}") from None
+        if arrays["points"].ndim != 2 or arrays["points"].shape[1] != 3:
+            raise InputError(f"mesh file {path} has points of shape {arrays['points'].shape}, must be (n, 3)")
+        tets, triangles = (_indices(path, arrays[name], len(arrays["points"])) for name in ("tets", "triangles"))
+        regions = _whole(arrays.get("regions"))
+        return MeshFile(path, arrays["points"], tets, triangles, regions, tuple(header["kinds"]))
+
+    def used_tets(self) -> tuple[FloatArray, IntArray, LongArray | None]:
+        """Positions of the nodes that tets use, the tets, regions. Raises `InputError` where there are none."""
+        positions, tets = self._used(self.tets, "tetrahedra")
+        return positions, tets, self.regions
+
+    def surface(self) -> tuple[FloatArray, IntArray]:
+        """Vertices that triangles use, coincident ones merged, and the triangles; see `read_surface`."""
+        return merge_coincident(*self._used(self.triangles, "triangles"))
+
+    def _used(self, cells: LongArray, what: str) -> tuple[FloatArray, IntArray]:
+        if len(cells) == 0:
+            raise InputError(f"mesh file {self.path} has no {what}, only {', '.join(self.kinds) or 'nothing'}")
+        used, renumbered = np.unique(cells, return_inverse=True)
+        positions = self.points[used]
+        bad = ~(np.abs(positions) < LARGEST).all(axis=1)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise InputError(
+                f"mesh file {self.path}: node {used[first]} has position {positions[first].tolist()}, must be below"
+                f" {LARGEST:g} m"
+            )
+        return positions, renumbered.reshape(cells.shape).astype(np.int32)
 
 
 def read_tets(path: Path) -> tuple[FloatArray, IntArray, LongArray | None]:
     """Positions [m] (n, 3), tets (m, 4) without unused nodes, and regions (m,) of a mesh file; see `TetMesh.read`."""
-    data = _read(path)
-    cells = [block.data for block in data.cells if block.type == "tetra"]
-    positions, tets = _used(path, data, cells, "tetrahedra")
-    return positions, tets, _regions(data)
+    return MeshFile.read(path).used_tets()
 
 
-def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
-    """Vertices [m] (q, 3) and triangles (t, 3) of a mesh file, quads cut in two; see `Obstacle.read`."""
-    data = _read(path)
-    halves = np.array([[0, 1, 2], [0, 2, 3]])
-    triangles = {"triangle": lambda cells: cells, "quad": lambda cells: cells[:, halves].reshape(-1, 3)}
-    cells = [triangles[block.type](np.asarray(block.data)) for block in data.cells if block.type in triangles]
-    return _used(path, data, cells, "triangles")
+def read_surface(path: str | Path) -> tuple[FloatArray, IntArray]:
+    """Vertices [m] (q, 3) and triangles (t, 3) of a surface file.
+
+    OBJ, STL, PLY, OFF, glTF and GLB are read by trimesh; USD, USDA, USDC and USDZ by OpenUSD (extra `usd`); the
+    triangles and quads of any other format by meshio. Polygons are cut into triangles. Lengths are taken as metres,
+    except in USD files, where `metersPerUnit` is heeded and a stage with z up is turned to y up. Objects of a scene
+    stand where its transforms put them, as one surface.
+
+    Vertices nearer to each other than 1e-7 of the diagonal of the bounding box are merged (texture seams, STL files),
+    and those that no triangle uses dropped.
+
+    Raises:
+        InputError: the file is missing, unreadable or has no triangles, a vertex is not finite.
+        MissingExtra: a USD file, and usd-core is not installed.
+    """
+    return MeshFile.read(path).surface()
 
 
-def _read(path: Path) -> Any:
-    """What meshio makes of a file. Raises `InputError` where it is missing, empty or cannot be read."""
-    import meshio
-
-    if not path.is_file():
-        raise InputError(f"mesh file {path} does not exist")
-    if path.stat().st_size == 0:
-        raise InputError(f"mesh file {path} is empty")
-    try:
-        # Its readers print, and count in few bits where they guess whether an STL is text.
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(over="ignore"):
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:  # its readers raise whatever they stumble over
-        reason = str(error).strip().splitlines()
-        raise InputError(f"mesh file {path} cannot be read: {reason[0] if reason else type(error).__name__}") from None
+def _indices(path: Path, cells: np.ndarray, points: int) -> LongArray:
+    if cells.dtype.kind not in "iu":
+        raise InputError(f"mesh file {path} has node indices of type {cells.dtype}, must be integers")
+    if cells.size and (cells.min() < 0 or cells.max() >= points):
+        bad = cells.min() if cells.min() < 0 else cells.max()
+        raise InputError(f"mesh file {path}: node index {bad} is outside its {points} nodes")
+    return cells.astype(np.int64)
 
 
-def _used(path: Path, data: Any, cells: list[Any], what: str) -> tuple[FloatArray, IntArray]:
-    """The nodes that `cells` use, and all cells in terms of them. Raises `InputError` where there are none."""
-    if not any(map(len, cells)):
-        kinds = sorted({block.type for block in data.cells}) or ["nothing"]
-        raise InputError(f"mesh file {path} has no {what}, only {', '.join(kinds)}")
-    stacked = np.vstack(cells)
-    used, renumbered = np.unique(stacked, return_inverse=True)
-    if used[0] < 0 or used[-1] >= len(data.points):
-        bad = used[-1] if used[0] >= 0 else used[0]
-        raise InputError(f"mesh file {path}: node index {bad} is outside its {len(data.points)} nodes")
-    positions = np.asarray(data.points, dtype=np.float64)[used, :3]
-    return positions, renumbered.reshape(stacked.shape).astype(np.int32)
-
-
-def _regions(data: Any) -> LongArray | None:
-    """The region of each tet of a meshio mesh, shape (m,), where it has such data and they are whole numbers."""
-    for name in REGION_DATA:
-        if name in data.cell_data:
-            pairs = zip(data.cells, data.cell_data[name], strict=True)
-            values = np.concatenate([np.asarray(given) for block, given in pairs if block.type == "tetra"])
-            whole = values.ndim == 1 and values.dtype.kind in "iuf" and np.isfinite(values).all()
-            if whole and (np.floor(values) == values).all():
-                return values.astype(np.int64)
-    return None
+def _whole(values: np.ndarray | None) -> LongArray | None:
+    """Region ids, where they are whole numbers."""
+    if values is None or values.ndim != 1 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+        return None
+    return values.astype(np.int64) if (np.floor(values) == values).all() else None

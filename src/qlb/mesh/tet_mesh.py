@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,14 @@ from qlb.mesh.embedded_surface import EmbeddedSurface
 from qlb.mesh.files import read_tets
 from qlb.mesh.geometry import signed_volumes
 
+if TYPE_CHECKING:
+    from qlb.mesh.filling import MeshReport
+
 # A tet counts as flat when its volume is below this fraction of its longest edge cubed (a regular one has 0.118).
 FLAT = 1e-10
+
+FARTHEST = 1e60
+"""Of a node from the origin [m]: powers of lengths further away are no numbers any more."""
 
 
 class TetMesh:
@@ -30,6 +36,7 @@ class TetMesh:
         regions: id of the region of each tet, shape (m,), int64, for parameters that differ from region to region; or
             None.
         surface: what pictures and exports show of it, or None for its boundary (`rendered`).
+        report: how it was made, if `from_surface` did.
 
     Raises:
         InputError: a NaN position, an index out of range, a tet that names a node twice, is flat or inverted, a node
@@ -49,6 +56,7 @@ class TetMesh:
         self.tets: IntArray = t.astype(np.int32, order="C")
         self.regions: LongArray | None = None if regions is None else _regions(regions, len(t))
         self.surface: EmbeddedSurface | None = None
+        self.report: MeshReport | None = None
         _check_geometry(self)
         self.positions.setflags(write=False)
         self.tets.setflags(write=False)
@@ -72,6 +80,63 @@ class TetMesh:
         """
         positions, tets, regions = read_tets(Path(path))
         return TetMesh(positions, tets, regions=regions)
+
+    @staticmethod
+    def from_surface(
+        source: str | Path | tuple[npt.ArrayLike, npt.ArrayLike],
+        *,
+        edge: float | None = None,
+        tets: int | None = None,
+        surface: bool = True,
+    ) -> TetMesh:
+        """Fill a surface with tetrahedra by fTetWild (extra `mesh`), and let the surface follow them.
+
+        Where the surface has holes, crosses itself, is doubled or inside out, the solid is what most of it winds
+        around. What was wrong is in `report`, and goes to the logger `qlb` as a warning each. Meshes are kept on disk
+        (docs/meshes.md), so that the same surface is filled only once.
+
+        Args:
+            source: a file that `qlb.mesh.read_surface` reads, or vertices (q, 3) [m] and triangles (t, 3).
+            edge: target length of the edges [m], or
+            tets: about how many tets to make, 5000 by default. Both may be missed where the surface needs smaller
+                tets: by at most a twentieth of an edge the boundary of the tets is off the surface.
+            surface: whether to keep the given surface as what pictures show; without it, that is the tets' boundary.
+
+        Y. Hu, T. Schneider, B. Wang, D. Zorin, D. Panozzo (2020), "Fast tetrahedral meshing in the wild", ACM Trans.
+        Graph. 39(4).
+
+        Raises:
+            InputError: the surface cannot be read, is flat or encloses nothing, or an argument is out of range.
+            MissingExtra: pytetwild is not installed.
+        """
+        from qlb.mesh.filling import fill, given_surface
+
+        return fill(*given_surface(source), edge=edge, tets=tets, surface=surface)
+
+    @staticmethod
+    def load(path: str | Path, *, edge: float | None = None, tets: int | None = None) -> TetMesh:
+        """The mesh of a file of tetrahedra (`read`), or of a surface that is filled with them (`from_surface`).
+
+        A file that holds both gives its tetrahedra. `edge` and `tets` matter for surfaces only.
+
+        Raises:
+            InputError: see `read` and `from_surface`.
+        """
+        from qlb.mesh.filling import load
+
+        return load(Path(path), edge=edge, tets=tets)
+
+    def write(self, path: str | Path) -> None:
+        """Write nodes and tets, in the format that the suffix of `path` asks for (.msh, .vtu, .vtk, .mesh, ...).
+
+        Regions are kept by .msh, .vtu, .vtk, .mesh, .xdmf and .med files. A surface is not written.
+
+        Raises:
+            InputError: a suffix whose format holds no tets, or a file that cannot be written.
+        """
+        from qlb.mesh.writing import write_tets
+
+        write_tets(self, Path(path))
 
     @staticmethod
     def union(meshes: Sequence[TetMesh]) -> TetMesh:
@@ -177,10 +242,11 @@ def _check_indices(tets: npt.NDArray[np.integer], nodes: int) -> None:
 
 
 def _check_geometry(mesh: TetMesh) -> None:
-    bad = ~np.isfinite(mesh.positions).all(axis=1)
+    bad = ~(np.abs(mesh.positions) < FARTHEST).all(axis=1)
     if bad.any():
         i = int(np.argmax(bad))
-        raise InputError(f"node {i} has position {mesh.positions[i].tolist()}, must be finite")
+        allowed = f"nearer than {FARTHEST:g} m" if np.isfinite(mesh.positions[i]).all() else "finite"
+        raise InputError(f"node {i} has position {mesh.positions[i].tolist()}, must be {allowed}")
     volume = mesh.volumes()
     scale = mesh.edge_lengths().max(axis=1) ** 3
     flat = np.abs(volume) <= FLAT * scale

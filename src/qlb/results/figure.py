@@ -31,6 +31,24 @@ _HEADROOM = 1.45
 
 
 @dataclass(frozen=True)
+class Finding:
+    """A statement on a figure, held against what was measured."""
+
+    statement: str
+    measured: str
+    """the numbers that decide"""
+    holds: bool | None
+    """None where a run is missing"""
+    sentence: str
+    """why it holds or does not"""
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        return {True: "holds", False: "does not hold", None: "not measured"}[self.holds]
+
+
+@dataclass(frozen=True)
 class FigureGrid:
     """What a figure shows."""
 
@@ -46,6 +64,8 @@ class FigureGrid:
     """what to look for"""
     reference: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """counts to hold against, by label of the row, then by solver"""
+    findings: Sequence[Finding] = ()
+    """what is said about the figure, held against its runs"""
 
     def cells(self) -> Iterator[tuple[str, str, Run | None]]:
         """Row, solver and run, row by row."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from qlb.results.figure import FigureGrid
 from qlb.results.files import write_text
-from qlb.results.report import Verdict, common, data_uri, flatten, template
+from qlb.results.report import data_uri, template
 from qlb.results.run import Run
+from qlb.results.wording import Verdict, common, flatten
 
 PAGE = "index.html"
 
@@ -78,6 +79,7 @@ def write_figures_page(
         "problems": problems,
         "notes": notes,
         "figures": [_figure(grid, directory) for grid in grids],
+        "has_findings": any(grid.findings for grid in grids),
         "settings": common([flatten(run.scene) for run in runs]) if runs else {},
         "versions": common([run.summary["versions"] for run in runs]) if runs else {},
     }
@@ -95,6 +97,7 @@ def _figure(grid: FigureGrid, directory: Path) -> dict[str, object]:
         "image": data_uri(directory / f"figure-{grid.number}.png"),
         "alt": f"Nonlinear iterations over time steps of {', '.join(grid.solvers)}; rows: {', '.join(grid.runs)}",
         "expectation": grid.expectation,
+        "findings": grid.findings,
         "groups": [[row for row in rows if row.row == label] for label in grid.runs],
         "has_reference": any(row.reference for row in rows),
         "files": [f"figure-{grid.number}.{suffix}" for suffix in ("svg", "pdf", "png", "csv")],

@@ -9,10 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from qlb.arrays import FloatArray
 from qlb.errors import InputError
@@ -20,7 +17,7 @@ from qlb.results import style
 from qlb.results.rendering import Camera, Image, import_pyvista, open_plotter, photograph
 from qlb.results.run import Frame, Run
 from qlb.results.scenery import Scenery
-from qlb.results.shown import COLOURS, ShownBodies
+from qlb.results.shown import ShownBodies
 
 _TITLE, _BAR, _MARGIN = 34, 78, 14
 _DPI = 100
@@ -136,22 +133,8 @@ def _compose(
         figure.figimage(image, left, bottom)
         x, y = left + grid.cell[0] / 2, bottom + grid.cell[1] + _TITLE / 2
         figure.text(x / width, y / height, title, ha="center", va="center", fontsize=12)
-    if len(bodies.names) > 1:
-        _add_names(figure, bodies)
-        return figure
-    bar = figure.add_axes((0.25, 46 / height, 0.5, 14 / height))
-    colours = ScalarMappable(Normalize(0, largest), COLOURS)
-    figure.colorbar(colours, cax=bar, orientation="horizontal")
-    bar.set_xlabel("displacement [m]", labelpad=2)
+    bodies.add_key(figure, (0.25, 46 / height, 0.5, 14 / height), largest)
     return figure
-
-
-def _add_names(figure: Figure, bodies: ShownBodies, most: int = 8) -> None:
-    """The colour of each of the first bodies that has a name."""
-    named = [(name, colour) for name, colour in zip(bodies.names, bodies.colours, strict=True) if name][:most]
-    if named:
-        patches = [Patch(color=colour, label=name) for name, colour in named]
-        figure.legend(handles=patches, loc="lower center", ncols=len(patches))
 
 
 def _time_texts(times: Sequence[float]) -> list[str]:

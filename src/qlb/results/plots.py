@@ -104,7 +104,7 @@ def plot_residuals(run: Run, path: Path) -> None:
 
     Writes PNG or SVG, as the suffix of `path` says. Raises `WriteError`.
     """
-    lines, steps, failed = _residual_lines(run.stats)
+    lines, steps, failed = residual_lines(run.stats)
     with style.look():
         figure = style.figure(8.0, 4.0)
         (ax,) = style.panels(figure, 1)
@@ -132,7 +132,7 @@ def plot_residuals(run: Run, path: Path) -> None:
         style.save(figure, path)
 
 
-def _residual_lines(stats: Statistics) -> tuple[list[FloatArray], LongArray, list[bool]]:
+def residual_lines(stats: Statistics) -> tuple[list[FloatArray], LongArray, list[bool]]:
     """(iteration, residual) of each solve, its step, and whether it failed; what is not finite or zero is left out."""
     lines, steps, failed = [], [], []
     begin = np.flatnonzero(stats["iteration"] == 0)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -52,14 +52,35 @@ class Camera:
     @staticmethod
     def facing(points: FloatArray) -> Camera:
         """One that looks at points (k, 3) [m] from in front, a little from the right and from above."""
-        backward = np.asarray(LOOK_FROM) / np.linalg.norm(LOOK_FROM)
-        right = np.cross((0.0, 1.0, 0.0), backward)
-        right /= np.linalg.norm(right)
-        axes = np.stack([right, np.cross(backward, right), backward])
+        axes = Camera.axes()
         seen = points @ axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
         width, height, depth = np.maximum(high - low, 1e-9 * max(1.0, float((high - low).max())))
-        return Camera(0.5 * (low + high) @ axes, backward, (float(width), float(height)), float(depth))
+        return Camera(0.5 * (low + high) @ axes, axes[2], (float(width), float(height)), float(depth))
+
+    @staticmethod
+    def axes() -> FloatArray:
+        """Right, up and backward as `facing` looks, shape (3, 3)."""
+        backward = np.asarray(LOOK_FROM) / np.linalg.norm(LOOK_FROM)
+        right = np.cross((0.0, 1.0, 0.0), backward)
+        right /= np.linalg.norm(right)
+        return np.stack([right, np.cross(backward, right), backward])
+
+    @staticmethod
+    def around(points: FloatArray) -> Camera:
+        """One that holds points (k, 3) [m] also where it is `turned`."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        focus, direction = 0.5 * (low + high), Camera.axes()[2]
+        across = 2 * float(np.hypot(*(points - focus)[:, [0, 2]].T).max())
+        above = float(direction[1])
+        height = float(high[1] - low[1]) * float(np.sqrt(1 - above**2)) + across * above
+        return Camera(focus, direction, (across, height), max(across, height))
+
+    def turned(self, angle: float) -> Camera:
+        """The same, gone around the vertical axis by `angle` [rad]."""
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        return replace(self, direction=turn @ self.direction)
 
     def aim(self, plotter: Any, height: float) -> None:
         """Let `plotter` look this way, at something `height` [m] high."""
@@ -92,9 +113,11 @@ def photograph(plotter: Any) -> Image:
     """What the plotter shows, with smooth edges, shape (height, width, 3)."""
     plotter.render()
     image = np.asarray(plotter.screenshot(return_img=True))
-    height, width, _ = image.shape
-    blocks = image.reshape(height // OVERSAMPLING, OVERSAMPLING, width // OVERSAMPLING, OVERSAMPLING, 3)
-    return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
+    block = [image[i::OVERSAMPLING, j::OVERSAMPLING] for i in range(OVERSAMPLING) for j in range(OVERSAMPLING)]
+    total = np.full(block[0].shape, len(block) // 2, np.uint16)
+    for part in block:
+        total += part
+    return (total // len(block)).astype(np.uint8)
 
 
 def import_pyvista() -> ModuleType:

@@ -72,7 +72,7 @@ class Scenery:
 
     def show(self, plotter: Any, pyvista: ModuleType, frame: int, bodies: FloatArray, backward: FloatArray) -> None:
         """Show a frame in place of the one before; planes seen from behind (`backward` leads to the camera) faintly."""
-        look = {"reset_camera": False, "ambient": 0.5, "diffuse": 0.6, "specular": 0.0}
+        look = {"reset_camera": False, "render": False, "ambient": 0.5, "diffuse": 0.6, "specular": 0.0}
         if len(self.triangles):
             surface = pyvista.PolyData.from_regular_faces(self.vertices[frame], self.triangles)
             plotter.add_mesh(surface, name="obstacles", color=OBSTACLE, **look)

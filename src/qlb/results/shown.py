@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import ListedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from qlb.arrays import FloatArray, IntArray
 from qlb.mesh import EmbeddedSurface
@@ -19,6 +22,7 @@ from qlb.results.run import Frame, Run
 COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.22, 1.0, 256)), name="displacement")
 """viridis without its darkest end, in which edges and shading would not show."""
 _REST = "#9aa5b1"
+_MOST_NAMES = 8
 _EDGES_BELOW = 20_000
 """So many triangles are shown without their edges."""
 
@@ -70,6 +74,7 @@ class ShownBodies:
             pyvista.PolyData.from_regular_faces(x, self.surface.triangles),
             name="bodies",
             reset_camera=False,
+            render=False,
             **self._scalars(x, largest),
             show_scalar_bar=False,
             show_edges=len(self.surface.triangles) < _EDGES_BELOW,
@@ -87,3 +92,17 @@ class ShownBodies:
             return {"scalars": self.displacement(x), "clim": (0.0, largest), "cmap": COLOURS}
         of_face = self.body[self.surface.triangles[:, 0]]
         return {"scalars": of_face, "clim": (-0.5, len(self.names) - 0.5), "cmap": ListedColormap(self.colours)}
+
+    def add_key(self, figure: Figure, place: tuple[float, float, float, float], largest: float) -> None:
+        """What the colours mean, at the foot of a figure: a bar at `place` (left, bottom, width, height, as parts of
+        the figure) up to the `largest` displacement [m]; or the names of the first bodies that have one.
+        """
+        if len(self.names) == 1:
+            bar = figure.add_axes(place)
+            figure.colorbar(ScalarMappable(Normalize(0, largest), COLOURS), cax=bar, orientation="horizontal")
+            bar.set_xlabel("displacement [m]", labelpad=2)
+            return
+        named = [(name, colour) for name, colour in zip(self.names, self.colours, strict=True) if name][:_MOST_NAMES]
+        if named:
+            patches = [Patch(color=colour, label=name) for name, colour in named]
+            figure.legend(handles=patches, loc="lower center", ncols=len(patches))

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from qlb.materials import Fibres
 from qlb.mesh import TetMesh
-from qlb.scenes.loads import Vector
+from qlb.scenes.mesh_source import MeshSource
 from qlb.scenes.scene import Scene
+from qlb.scenes.values import Vector
+from qlb.setting_keys import at_key
 from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 from qlb.system import Rotation
 
+Cells = Annotated[int, Field(le=1_000_000)]
 
-class BoxMeshSettings(Settings):
+
+class BoxMeshSettings(MeshSource):
     """A box of tetrahedra, or a mesh file."""
 
     size: Vector = Field((1.0, 0.25, 0.25), description="Lengths of the box [m]")
-    cells: tuple[int, int, int] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
-    path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the box")
+    cells: tuple[Cells, Cells, Cells] = Field((20, 5, 5), description="Cells along each axis, six tetrahedra in each")
+
+    def make(self) -> TetMesh:
+        """The mesh. Raises `InputError` where the file or a setting is wrong."""
+        return TetMesh.box(self.size, cells=self.cells) if self.path is None else self.load(self.path)
 
 
 class TwistSettings(Settings):
@@ -41,25 +47,22 @@ class BarScene(Scene):
     mesh: BoxMeshSettings = BoxMeshSettings()
     twist: TwistSettings = TwistSettings()
 
-    def build(self) -> Simulation:
+    def make(self) -> Simulation:
         """The bar with its ends held. Raises `InputError` where mesh or settings are wrong."""
-        mesh = (
-            TetMesh.box(self.mesh.size, cells=self.mesh.cells)
-            if self.mesh.path is None
-            else TetMesh.read(self.mesh.path)
-        )
+        with at_key("mesh"):
+            mesh = self.mesh.make()
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         near = 1e-6 * (high[0] - low[0])
-        simulation = Simulation(mesh, **self.simulation_arguments() | self._composition(mesh))
+        simulation = Simulation(mesh, **self.simulation_arguments() | self.composition() | self._variation(mesh))
         simulation.pin(mesh.nodes_where(lambda x: x[:, 0] <= low[0] + near))
         if self.variant == "twist":
             centre = 0.5 * (low + high)
             axis = Rotation(axis=(1.0, 0.0, 0.0), origin=tuple(centre), rate=self.twist.rate)
             simulation.move(mesh.nodes_where(lambda x: x[:, 0] >= high[0] - near), axis)
-        self.loads.add_to(simulation)
+        self.add_to(simulation)
         return simulation
 
-    def _composition(self, mesh: TetMesh) -> dict[str, Any]:
+    def _variation(self, mesh: TetMesh) -> dict[str, Any]:
         """Material and fibres, for the variants of the paper's figures 3 and 4 (the numbers are ours)."""
         arguments: dict[str, Any] = {}
         if self.heterogeneous:

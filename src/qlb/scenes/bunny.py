@@ -8,7 +8,7 @@ from pydantic import Field
 
 from qlb import shapes
 from qlb.scenes.contact_scene import CharacterMesh, ContactScene, lifted
-from qlb.scenes.loads import Vector
+from qlb.scenes.values import Vector
 from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 
@@ -27,7 +27,7 @@ class BunnyScene(ContactScene):
     mesh: CharacterMesh = CharacterMesh()
     drop: DropSettings = DropSettings()
 
-    def build(self) -> Simulation:
+    def make(self) -> Simulation:
         """The bunny above the ground. Raises `InputError` where mesh or settings are wrong."""
         mesh = lifted(self.mesh.make(shapes.bunny), self.drop.rotation, self.drop.height)
         return self.simulate([self.body(mesh, "bunny")])

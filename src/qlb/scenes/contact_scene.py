@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -15,22 +13,23 @@ from qlb.energies import Damping
 from qlb.integrators import INTEGRATORS
 from qlb.materials import AnyMaterial, StableNeoHookean
 from qlb.mesh import TetMesh
-from qlb.scenes.loads import Vector
-from qlb.scenes.scene import Scene
-from qlb.settings import Settings, choice, quantity
+from qlb.scenes.mesh_source import MeshSource
+from qlb.scenes.scene import MOST_STEPS, AnyContact, Scene
+from qlb.scenes.values import Vector
+from qlb.setting_keys import at_key
+from qlb.settings import choice, quantity
 from qlb.simulation import Simulation
 
 
-class CharacterMesh(Settings):
+class CharacterMesh(MeshSource):
     """A character of `qlb.shapes`, or a mesh file, y up."""
 
-    path: Path | None = Field(None, description="A tetrahedral mesh file to use instead of the shape, y up")
-    tets: int = quantity(5000, "About how many tetrahedra the shape is to have; a file has its own", ge=100)
     height: float = quantity(0.3, "Height along y before it is turned, to which the mesh is scaled", unit="m", gt=0)
 
     def make(self, shape: Callable[..., TetMesh]) -> TetMesh:
         """The mesh. Raises `InputError` where the file is wrong, or the shape cannot be made with so few tets."""
-        mesh = shape(tets=self.tets) if self.path is None else TetMesh.read(self.path)
+        with at_key("mesh"):
+            mesh = shape(**self.target()) if self.path is None else self.load(self.path)
         return Placement(scale=self.height / float(np.ptp(mesh.positions[:, 1]))).of(mesh)
 
 
@@ -39,26 +38,21 @@ class ContactScene(Scene):
 
     material: AnyMaterial = Field(StableNeoHookean(young=2e4, poisson=0.45), description="What the bodies are made of")
     damping: Damping = Damping(viscosity=20)
-    contact: Contact = Contact(friction=0.3)
+    contact: AnyContact | None = Field(Contact(friction=0.3), description="How things touch; false: not at all")
     integrator: str = choice("SDIRK2", "Time integrator", INTEGRATORS)
-    steps: int = quantity(200, "Number of time steps", ge=1)
+    steps: int = quantity(200, "Number of time steps", ge=1, le=MOST_STEPS)
 
     def simulate(self, bodies: Sequence[Body]) -> Simulation:
         """The bodies over the ground, with the loads. Raises `InputError` where settings are wrong."""
-        simulation = Simulation(
-            bodies, obstacles=[Plane((0, 0, 0), (0, 1, 0), name="ground")], **self.simulation_arguments()
-        )
-        self.loads.add_to(simulation)
+        arguments = self.simulation_arguments()
+        arguments["obstacles"] = [Plane((0, 0, 0), (0, 1, 0), name="ground"), *arguments["obstacles"]]
+        simulation = Simulation(bodies, **arguments)
+        self.add_to(simulation)
         return simulation
 
     def body(self, mesh: TetMesh, name: str) -> Body:
         """A body of the scene's material, where `mesh` lies."""
-        return Body(mesh, self.material, fibres=() if self.fibres is None else (self.fibres,), name=name)
-
-    def simulation_arguments(self) -> dict[str, Any]:
-        """Without what each body has its own."""
-        arguments = super().simulation_arguments()
-        return {k: v for k, v in arguments.items() if k not in ("material", "fibres")} | {"contact": self.contact}
+        return Body(mesh, **self.composition(), name=name)
 
 
 def lifted(mesh: TetMesh, rotation: Vector, lowest: float, x: float = 0.0, z: float = 0.0) -> TetMesh:

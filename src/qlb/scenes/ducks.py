@@ -11,7 +11,7 @@ from qlb import shapes
 from qlb.bodies import Body
 from qlb.mesh import TetMesh
 from qlb.scenes.contact_scene import CharacterMesh, ContactScene, lifted
-from qlb.scenes.loads import Vector
+from qlb.scenes.values import Vector
 from qlb.settings import Settings, quantity
 from qlb.simulation import Simulation
 
@@ -36,7 +36,7 @@ class DucksScene(ContactScene):
     mesh: CharacterMesh = CharacterMesh(tets=2000, height=0.25)
     stack: StackSettings = StackSettings()
 
-    def build(self) -> Simulation:
+    def make(self) -> Simulation:
         """The stack of ducks. Raises `InputError` where mesh or settings are wrong."""
         mesh, lowest = self.mesh.make(shapes.duck), self.stack.height
         bodies: list[Body] = []

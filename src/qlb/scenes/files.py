@@ -1,152 +1,143 @@
-"""Scenes from files and from KEY=VALUE pairs, and back to a commented file."""
+"""Scenes from files and from KEY=VALUE pairs."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import yaml
-from pydantic import BaseModel
+from typing import Any, get_args
 
 from qlb.errors import InputError
-from qlb.scenes.scene import Scene
-from qlb.settings import ENTRY, describe_range, key_fields, plain, unknown_key
+from qlb.scenes.document import Document, read_document
+from qlb.scenes.overrides import override
+from qlb.scenes.scene import FORMAT_VERSION, Scene
+from qlb.scenes.toml_document import parse_toml
+from qlb.scenes.yaml_document import parse_yaml
+from qlb.setting_keys import ENTRY, SettingError, key_fields, unknown_key
+
+PARSERS = {".yaml": parse_yaml, ".toml": parse_toml}
+"""By the ending of a file; the first reads all others."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scene comes from.
+
+    Attributes:
+        document: its file, or None for a built-in scene.
+        changed: keys that KEY=VALUE pairs have set since.
+    """
+
+    document: Document | None
+    changed: tuple[str, ...] = ()
+
+    def located(self, error: InputError) -> InputError:
+        """`error` with the place in the file that it is about in front."""
+        if self.document is None:
+            return error
+        key = error.key if isinstance(error, SettingError) else ""
+        if any(f"{key}.".startswith(f"{changed}.") for changed in self.changed):
+            return error
+        return SettingError(key, f"{self.document.at(self.document.place(key))}: {error}")
 
 
 def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:
-    """A built-in scene by name, or a scene file (YAML) by path, with KEY=VALUE overrides in order.
+    """A built-in scene by name, or a scene file by path (YAML, or TOML by its ending), with KEY=VALUE pairs in order.
+
+    Paths in a file are relative to the file, those of overrides to the working directory.
 
     Raises:
-        InputError: no such scene or file, a file that is not valid, an unknown key, a value out of range.
+        InputError: no such scene or file, a file that is not valid, an unknown key, a value out of range; with file,
+            line and column where the file is to blame.
     """
     from qlb.scenes import SCENES
 
-    data: dict[str, Any] = {}
-    if name not in SCENES:
-        data = _read(name, SCENES)
-    kind = SCENES[data.get("scene", name)]
-    for override in overrides:
-        _override(kind, data, override)
-    return kind.parse(data)
+    if name in SCENES:
+        kind, data, document = SCENES[name], SCENES[name].start(), None
+    else:
+        document = _read(name)
+        kind = _kind(document)
+        data = document.root.plain()
+        _resolve_paths(kind, data, document.path.parent.absolute())
+    pairs = list(overrides)
+    keys = [override(kind, data, pair) for pair in pairs]
+    source = Source(document, tuple(keys))
+    try:
+        scene = kind.parse(data)
+    except InputError as error:
+        raise source.located(error) from None
+    scene.come_from(source)
+    return scene
 
 
-def _read(name: str, scenes: Mapping[str, type[Scene]]) -> dict[str, Any]:
+def _read(name: str) -> Document:
+    from qlb.scenes import SCENES
+
     path = Path(name)
-    known = f"built-in scenes: {', '.join(scenes)}"
-    if not path.is_file():
-        raise InputError(f"scene {name!r} is neither a built-in scene nor a file; {known}")
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"scene file {name} is not valid YAML: {' '.join(str(error).split())}") from None
-    except OSError as error:
-        raise InputError(f"scene file {name} cannot be read: {error.strerror}") from None
-    if not isinstance(data, dict):
-        raise InputError(f"scene file {name} holds {type(data).__name__}, must hold keys and values")
-    if data.get("scene") not in scenes:
-        raise InputError(f"scene file {name}: scene = {data.get('scene')!r} is not known; {known}")
-    mesh = data.get("mesh")
-    if isinstance(mesh, dict) and isinstance(mesh.get("path"), str):
-        mesh["path"] = str(path.parent / mesh["path"])
-    return data
+        found = path.is_file()
+    except OSError:  # a name that is too long
+        found = False
+    if not found:
+        known = f"built-in scenes: {', '.join(SCENES)}"
+        raise InputError(f"scene {_shown(name)} is neither a built-in scene nor a file; {known}")
+    return read_document(path, PARSERS)
 
 
-def _override(kind: type[Scene], data: dict[str, Any], override: str) -> None:
-    key, separator, text = override.partition("=")
-    key = key.strip()
-    if not separator or not key:
-        raise InputError(f"--set {override!r} must have the form KEY=VALUE")
-    valid = key_fields(kind)
-    parts = key.split(".")
-    if ".".join(ENTRY if _is_index(part) else part for part in parts) not in valid:
-        raise InputError(unknown_key(key, valid))
-    place: Any = data
-    for depth, (part, following) in enumerate(itertools.pairwise(parts), start=1):
-        index = _index(place, part, ".".join(parts[: depth - 1]))
-        if isinstance(place, dict) and place.get(part) is None:
-            place[part] = [] if _is_index(following) else {}
-        place = place[index]
-        if not isinstance(place, dict | list):
-            raise InputError(f"{'.'.join(parts[:depth])} = {place!r} must hold keys and values")
-    place[_index(place, parts[-1], ".".join(parts[:-1]))] = _value(text)
+def _kind(document: Document) -> type[Scene]:
+    """The scene that a file is about, of a version that is known. Raises `InputError`."""
+    from qlb.scenes import SCENES
+
+    data = document.root.plain()
+    version, name = data.get("version", FORMAT_VERSION), data.get("scene")
+    source = Source(document)
+    if isinstance(version, bool) or version != FORMAT_VERSION:
+        problem = f"version = {_shown(version)} is not known: this qlb reads version {FORMAT_VERSION}"
+        raise source.located(SettingError("version", problem))
+    if name is None and "scene" not in data:
+        if "bodies" in data:
+            return SCENES["bodies"]
+        unknown = next((str(key) for key in data if str(key) not in _all_keys()), "")
+        hint = f"; {unknown_key(unknown, ['scene', 'bodies'])}" if unknown else ""
+        problem = f"scene is missing: it names a scene, and bodies lists your own{hint}"
+        raise source.located(SettingError(unknown, problem))
+    if not isinstance(name, str) or name not in SCENES:
+        known = f"built-in scenes: {', '.join(SCENES)}"
+        raise source.located(SettingError("scene", f"scene = {_shown(name)} is not known; {known}"))
+    return SCENES[name]
 
 
-def _is_index(part: str) -> bool:
-    """Whether this part of a key is the number of an entry in a list."""
-    return part.isascii() and part.isdecimal()
+def _all_keys() -> set[str]:
+    from qlb.scenes import SCENES
+
+    return {key for kind in SCENES.values() for key in kind.model_fields}
 
 
-def _index(place: dict[str, Any] | list[Any], part: str, key: str) -> Any:
-    """What leads to `part` of a key within `place`, which is at `key`. Raises `InputError` for an entry it lacks."""
-    if isinstance(place, dict) and not _is_index(part):
-        return part
-    if isinstance(place, list) and _is_index(part) and int(part) < len(place):
-        return int(part)
-    kind = f"a list of {len(place)} entries" if isinstance(place, list) else "no list"
-    raise InputError(f"{key} is {kind} and has no entry {part}")
+def _resolve_paths(kind: type[Scene], data: Any, folder: Path) -> None:
+    """Make every path in `data` absolute that is relative to `folder`, whatever key of the scene has it."""
+    for key, field in key_fields(kind).items():
+        if _is_path(field.annotation):
+            *above, last = key.split(".")
+            for place in _places(data, above):
+                if isinstance(place, dict) and isinstance(place.get(last), str):
+                    place[last] = str(folder / place[last])
 
 
-def _value(text: str) -> Any:
-    """A value as YAML reads it; "1,2,3" is a list, and "where(x < 1, 2, 3)" is not."""
-    parts = _split(text)
-    if len(parts) > 1:
-        return [_value(part) for part in parts]
-    try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError):  # a date such as 2001-99-99 is a ValueError
-        return text
+def _is_path(annotation: Any) -> bool:
+    return annotation is Path or any(map(_is_path, get_args(annotation)))
 
 
-def _split(text: str) -> list[str]:
-    """The parts of `text` between commas, other than commas inside brackets."""
-    parts, depth = [""], 0
-    for character in text:
-        depth += (character in "([{") - (character in ")]}")
-        if character == "," and depth == 0:
-            parts.append("")
+def _places(data: Any, parts: list[str]) -> list[Any]:
+    """What lies at a key of `key_fields` in plain data, once for each entry of a list on the way."""
+    places = [data]
+    for part in parts:
+        if part == ENTRY:
+            places = [entry for place in places if isinstance(place, list) for entry in place]
         else:
-            parts[-1] += character
-    return parts
+            places = [place[part] for place in places if isinstance(place, dict) and part in place]
+    return places
 
 
-def scene_yaml(scene: Scene) -> str:
-    """The scene as a file with every key, and what each means. `load_scene` reads it back to the same scene."""
-    lines = [f"# {type(scene).__doc__}", f"scene: {scene.model_dump()['scene']}"]
-    lines += _lines(scene, indent="")
-    return "\n".join(lines) + "\n"
-
-
-def _lines(model: BaseModel, indent: str) -> list[str]:
-    lines: list[str] = []
-    for name, field in type(model).model_fields.items():
-        value = getattr(model, name)
-        if name == "scene":
-            continue
-        if isinstance(value, BaseModel):
-            lines += ["", f"{indent}{name}:"] if not indent else [f"{indent}{name}:"]
-            lines += _lines(value, indent + "  ")
-            continue
-        text = f"{indent}{name}: {_plain(value)}"
-        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-        notes = [field.description or ""]
-        if "enum" in extra:
-            notes.append(f"one of {', '.join(map(str, extra['enum']))}")  # type: ignore[arg-type]
-        if "bounds" in extra:
-            notes.append(describe_range(extra["bounds"], str(extra["unit"])))  # type: ignore[arg-type]
-        comment = "; ".join(note for note in notes if note)
-        lines.append(f"{text:<36} # {comment}" if comment else text)
-    return lines
-
-
-def _plain(value: Any) -> str:
-    """One line of YAML for a leaf value."""
-    if value is None:
-        return "null"
-    value = plain(value)
-    if isinstance(value, tuple):
-        value = [part.model_dump(mode="json") if isinstance(part, BaseModel) else part for part in value]
-    if isinstance(value, Path):
-        value = str(value)
-    return yaml.safe_dump(value, default_flow_style=True, width=2**31).strip().removesuffix("...").strip()
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from qlb.arrays import FloatArray, IntArray
+from qlb.arrays import FloatArray, IntArray, whole_number
 from qlb.errors import InputError
 from qlb.mesh import TetMesh
+from qlb.mesh.geometry import tet_components
 from qlb.shapes.smoothing import smooth
 from qlb.shapes.solid import Solid
 from qlb.shapes.stuffing import stuff
-from qlb.shapes.topology import characteristic, is_closed_surface, pieces
+from qlb.shapes.topology import characteristic, is_closed_surface
 
 FEWEST, MOST = 100, 2_000_000
 CLOSE, ALLOWED = 0.03, 0.2
@@ -21,6 +22,8 @@ by more than the second."""
 TRIES, CENTRED_TRIES = 16, 6
 SHIFT = (0.13, 0.21, 0.34)
 """Of the lattice, in spacings, where no symmetric mesh has the right number of tets."""
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Lengths of a solid [m]."""
 LATTICE = 2e7
 """The most tets that a lattice over the bounds of a solid may have."""
 
@@ -52,8 +55,12 @@ def mesh_solid(
         raise InputError(f"{name}: give either tets or edge, not both" if edge else f"{name}: give tets or edge")
     if not (np.isfinite(solid.low).all() and np.isfinite(solid.high).all() and (solid.low < solid.high).all()):
         raise InputError(f"{name} has the bounds {solid.low} to {solid.high}, must be a box of finite size")
+    extent = solid.high - solid.low
+    if not (extent.min() >= SMALLEST and extent.max() <= LARGEST):
+        lengths = " x ".join(f"{length:.3g}" for length in extent)
+        raise InputError(f"{name} is {lengths} m large, must be {SMALLEST:g} to {LARGEST:g} m along each axis")
     if edge is not None:
-        size = float((solid.high - solid.low).max())
+        size = float(extent.max())
         if not (np.isfinite(edge) and size / 1000 <= edge <= size):
             raise InputError(f"{name}: edge {edge} is out of range: {size / 1000:.3g} to {size:.3g} m")
         mesh = _Filling(solid, f"{name} with edge {edge:g} m", euler, LATTICE).by_edge(edge)
@@ -62,14 +69,6 @@ def mesh_solid(
         # Down to a twentieth of the bounds may be solid.
         mesh = _Filling(solid, f"{name} of {tets} tets", euler, min(LATTICE, 2e5 + 20 * wanted)).by_number(wanted)
     return smooth(mesh, solid) if smoothing else mesh
-
-
-def whole_number(name: str, value: object, low: int, high: int) -> int:
-    """`value` as an int, which must be a whole number from `low` to `high`."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not low <= value <= high:  # type: ignore[operator]
-        raise InputError(f"{name} {value!r} is out of range: a whole number, {low} to {high}")
-    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 @dataclass
@@ -126,7 +125,8 @@ class _Filling:
     def _stuffed(
         self, spacing: float, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> tuple[FloatArray, IntArray]:
-        if 12 * np.prod((self.solid.high - self.solid.low) / spacing) > self.most:
+        # At least one cube lies along each axis, also of a solid that is thinner than that.
+        if 12 * np.prod(np.ceil((self.solid.high - self.solid.low) / spacing)) > self.most:
             raise InputError(f"{self.name}: its bounds would hold more than {self.most:.2g} tets, too much to fill")
         return stuff(self.solid, spacing, shift=shift)
 
@@ -136,7 +136,7 @@ class _Filling:
             self.refusal = "is too coarse: no lattice point falls into the solid"
             return None
         mesh = TetMesh(positions, tets)
-        count = pieces(mesh)
+        count = tet_components(mesh.tets)
         if count > 1:
             self.refusal = f"falls into {count} pieces: the solid must be one piece, and thicker than its edges"
         elif not is_closed_surface(mesh):

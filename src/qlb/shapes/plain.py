@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from qlb.arrays import FloatArray, vectors
+from qlb.arrays import FloatArray, vectors, whole_number
 from qlb.errors import InputError
 from qlb.mesh import TetMesh
-from qlb.shapes.mesher import mesh_solid, whole_number
+from qlb.shapes.mesher import mesh_solid
 from qlb.shapes.primitives import positive, ring, rounded_cylinder, sphere
 
 DEFAULT_TETS = 5000
@@ -63,9 +63,12 @@ def box(size: Sequence[float] = (0.2, 0.2, 0.2), *, tets: int | None = None, edg
         positive("box: size", float(length))
     given = _size(tets, edge)
     if edge is not None:
-        cells = np.maximum(1, np.rint(lengths / positive("box: edge", edge)))
+        with np.errstate(over="ignore"):
+            cells = np.maximum(1, np.rint(lengths / positive("box: edge", edge)))
     else:
         cells = _cells(lengths, whole_number("box: tets", given["tets"], 6, 2_000_000))
+    if not np.isfinite(cells).all():
+        raise InputError(f"box: edge {edge} is out of range: too short for lengths {tuple(lengths.tolist())}")
     mesh = TetMesh.box(tuple(lengths), cells=tuple(int(c) for c in cells))  # type: ignore[arg-type]
     return TetMesh(mesh.positions - 0.5 * lengths, mesh.tets)
 

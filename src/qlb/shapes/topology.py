@@ -1,20 +1,11 @@
-"""Whether tetrahedra make one body with a boundary that is a closed surface."""
+"""Whether tetrahedra have a boundary that is a closed surface, and of which kind."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from qlb.arrays import LongArray
 from qlb.mesh import TetMesh
-
-
-def pieces(mesh: TetMesh) -> int:
-    """Number of parts of a mesh that hang together through faces."""
-    faces = np.sort(mesh.tets.astype(np.int64)[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
-    keys = _keys(faces, len(mesh.positions))
-    order = np.argsort(keys, kind="stable")
-    shared = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    return _parts(len(mesh.tets), order[shared] // 4, order[shared + 1] // 4)
+from qlb.mesh.geometry import parts
 
 
 def is_closed_surface(mesh: TetMesh) -> bool:
@@ -29,25 +20,11 @@ def is_closed_surface(mesh: TetMesh) -> bool:
         return False
     # Across an edge, the corner at its start meets that at the end of the edge that runs back, and the other way round.
     following = np.arange(len(start)).reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    fans = _parts(len(start), forward, following[backward])
-    return fans == len(np.unique(triangles))
+    fans = parts(len(start), forward, following[backward])
+    return int(fans.max()) + 1 == len(np.unique(triangles))
 
 
 def characteristic(mesh: TetMesh) -> int:
     """Euler characteristic V - E + F of a closed boundary: 2, less 2 for each handle, plus 2 for each cavity."""
     triangles = mesh.boundary_triangles()
     return len(np.unique(triangles)) - len(triangles) // 2
-
-
-def _keys(faces: LongArray, nodes: int) -> LongArray:
-    """One number for each sorted triple."""
-    pair = np.unique(faces[:, 0] * nodes + faces[:, 1], return_inverse=True)[1]
-    return np.asarray(pair * nodes + faces[:, 2])
-
-
-def _parts(count: int, a: LongArray, b: LongArray) -> int:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    return int(connected_components(graph, directed=False, return_labels=False))

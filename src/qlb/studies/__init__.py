@@ -1,10 +1,11 @@
-"""Runs of scenes: one into a directory, several side by side, or all that the supplement's figures need."""
+"""Runs of scenes: one, several side by side, those of the supplement's figures, products of settings."""
 
 from qlb.studies.compare import Comparison, SolverCase, compare
+from qlb.studies.processes import Case, Update
 from qlb.studies.reproduce import Plan, Reproduction, plan_figures, reproduce
 from qlb.studies.reproduce_figures import FIGURES, SupplementFigure, chosen_figures
-from qlb.studies.reproduce_processes import Case, Update
 from qlb.studies.run import resume_run, run_scene, scene_of
+from qlb.studies.sweep import Sweep, SweepPlan, plan_sweep, sweep
 
 __all__ = [
     "FIGURES",
@@ -14,12 +15,16 @@ __all__ = [
     "Reproduction",
     "SolverCase",
     "SupplementFigure",
+    "Sweep",
+    "SweepPlan",
     "Update",
     "chosen_figures",
     "compare",
     "plan_figures",
+    "plan_sweep",
     "reproduce",
     "resume_run",
     "run_scene",
     "scene_of",
+    "sweep",
 ]

@@ -10,13 +10,16 @@ from typing import Any
 
 from qlb.errors import InputError
 from qlb.results import Run
-from qlb.results.figure import FigureGrid, write_figure
-from qlb.results.figure_page import write_figures_page
+from qlb.results.figure import FORMATS, FigureGrid, write_figure
+from qlb.results.figure_page import PAGE, write_figures_page
 from qlb.scenes import load_scene
+from qlb.studies.folder import RUNS, StudyKind, claim_folder, is_complete, run_of
+from qlb.studies.processes import Case, Update, run_cases
 from qlb.studies.reproduce_figures import COLUMNS, FIGURES, Row, SupplementFigure
-from qlb.studies.reproduce_folder import RUNS, claim_folder
-from qlb.studies.reproduce_processes import Case, Update, run_cases
+from qlb.studies.statements import measure
 
+_PRODUCTS = [f"figure-{number}.{suffix}" for number in FIGURES for suffix in (*FORMATS, "csv")]
+_KIND = StudyKind("qlb reproduce", "reproduce.json", [*_PRODUCTS, PAGE])
 _FIXED = ("on_failure=accept", "threads=1", "output.stride=10")
 _OURS = ("solver", "on_failure", "threads")
 _WEIGHTS = {"QLF": 20.0, "ND": 3.0}
@@ -136,7 +139,7 @@ def reproduce(
     """
     if processes < 1:
         raise InputError(f"processes = {processes} is out of range: must be >= 1")
-    claim_folder(plan.directory, plan.bases, [case.directory for case in plan.cases], overwrite=overwrite)
+    claim_folder(_KIND, plan.directory, plan.bases, [case.directory for case in plan.cases], overwrite=overwrite)
     kept = [] if overwrite else [case for case in plan.cases if is_complete(case)]
     for case in kept:
         on_update(Update(case, "kept", case.steps))
@@ -152,26 +155,10 @@ def reproduce(
     return Reproduction(plan.directory, grids, problems, page=page)
 
 
-def is_complete(case: Case) -> bool:
-    """Whether the directory of a case holds its run, with the same settings and from start to end."""
-    run = _run(case)
-    return run is not None and run.summary["status"] == "complete"
-
-
-def _run(case: Case) -> Run | None:
-    """The run of a case as far as it got by itself; None where there is none, or one cut off or of other settings."""
-    try:
-        run = Run(case.directory)
-        same = run.scene == case.scene and run.summary["status"] in ("complete", "failed")
-    except (InputError, KeyError):
-        return None
-    return run if same and len(run.stats["step"]) else None
-
-
 def _grids(plan: Plan) -> Iterator[FigureGrid]:
     """The figures asked for, and others of the supplement whose runs are all there."""
     everything = _with_others(plan)
-    runs = {case.name: _run(case) for case in everything.cases}
+    runs = {case.name: run_of(case) for case in everything.cases}
     for figure in everything.figures:
         if figure in plan.figures or all(is_complete(case) for case in everything.cases_of(figure)):
             yield _grid(figure, everything, runs)
@@ -204,4 +191,5 @@ def _grid(figure: SupplementFigure, plan: Plan, runs: dict[str, Run | None]) -> 
         found,
         figure.expectation,
         {} if plan.overrides else reference,
+        [statement.against(measure(found)) for statement in figure.statements],
     )

@@ -34,6 +34,7 @@ def run_scene(
     directory: Path,
     *,
     overwrite: bool = False,
+    on_start: Callable[[Path], None] = lambda directory: None,
     on_step: Callable[[StepResult], None] = lambda result: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Outcome:
@@ -43,6 +44,7 @@ def run_scene(
         scene: what to run.
         directory: where; made, and refused if it holds anything.
         overwrite: replace an earlier run there.
+        on_start: called with the directory when it holds the first frame.
         on_step: called after each step, the failed one included.
         stop: asked before each step whether to end early.
 
@@ -50,16 +52,19 @@ def run_scene(
         InputError: the scene cannot be built, or the directory cannot be used.
     """
     simulation = scene.build()
+    with scene.located():
+        _ = simulation.system  # what only shows when everything is there
     writer = RunWriter(
         directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite, **scene.output.model_dump()
     )
-    return _record(writer, simulation, scene.steps, on_step, stop)
+    return _record(writer, simulation, scene.steps, on_start, on_step, stop)
 
 
 def resume_run(
     directory: Path,
     *,
     steps: int | None = None,
+    on_start: Callable[[Path], None] = lambda directory: None,
     on_step: Callable[[StepResult], None] = lambda result: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Outcome:
@@ -68,6 +73,7 @@ def resume_run(
     Args:
         directory: a run directory that `run_scene` wrote.
         steps: how many steps the run is to have in all; by default as many as its scene says.
+        on_start: called with the directory when it is locked and can be read.
         on_step: called after each new step, the failed one included.
         stop: asked before each step whether to end early.
 
@@ -82,7 +88,7 @@ def resume_run(
     simulation = scene.build()
     run.restore(simulation)
     writer = RunWriter(directory, scene.model_dump(mode="json"), simulation, resume=True, **scene.output.model_dump())
-    return _record(writer, simulation, scene.steps, on_step, stop)
+    return _record(writer, simulation, scene.steps, on_start, on_step, stop)
 
 
 def scene_of(directory: Path, steps: int | None = None) -> Scene:
@@ -98,12 +104,14 @@ def _record(
     writer: RunWriter,
     simulation: Simulation,
     steps: int,
+    on_start: Callable[[Path], None],
     on_step: Callable[[StepResult], None],
     stop: Callable[[], bool],
 ) -> Outcome:
     """Step until `steps` are done, or one fails, or it is to stop."""
     try:
         with writer:
+            on_start(writer.directory)
             while simulation.steps_done < steps:
                 if stop():
                     writer.finish("interrupted")

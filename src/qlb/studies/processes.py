@@ -8,21 +8,24 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from queue import Empty, Queue
 from threading import Thread
 from typing import Any, Literal
 
-WORKER = (sys.executable, "-P", "-m", "qlb.studies.reproduce_worker")
+WORKER = (sys.executable, "-P", "-m", "qlb.studies.worker")
 """The command that runs a case; see there for what it reads and writes."""
+
+REFUSED = 2
+"""Exit status of a process whose scene cannot be built."""
 
 _SECONDS_BETWEEN_LOOKS = 0.2
 
 
 @dataclass(frozen=True)
 class Case:
-    """One run that figures need."""
+    """One run of a study."""
 
     name: str
     """of its folder, such as young-6e3-QLF"""
@@ -31,6 +34,8 @@ class Case:
     directory: Path
     weight: float = 1.0
     """expected work of a step, to start the longest first"""
+    cwd: Path = field(default_factory=Path.cwd)
+    """what relative paths in the scene start from"""
 
     @property
     def steps(self) -> int:
@@ -43,12 +48,12 @@ class Update:
     """What became of a case."""
 
     case: Case
-    state: Literal["kept", "step", "finished", "crashed"]
-    """kept: it lay there complete; step: it took one more step"""
+    state: Literal["kept", "step", "finished", "refused", "crashed"]
+    """kept: it lay there complete; step: it took one more step; refused: its scene cannot be built"""
     steps: int
     """taken so far"""
     message: str = ""
-    """why it crashed"""
+    """why it was refused or crashed"""
 
 
 def run_cases(
@@ -84,7 +89,7 @@ def run_cases(
                 continue
             if update.state != "step":
                 del running[update.case.name]
-            if update.state == "crashed":
+            if update.state in ("refused", "crashed"):
                 problems[update.case.name] = update.message
             on_update(update)
     finally:
@@ -105,6 +110,7 @@ def _start(case: Case, updates: Queue[Update]) -> subprocess.Popen[str]:
         text=True,
         errors="replace",
         start_new_session=True,
+        cwd=case.cwd,
     )
     Thread(target=_follow, args=(case, process, updates), daemon=True).start()
     return process
@@ -132,7 +138,8 @@ def _follow(case: Case, process: subprocess.Popen[str], updates: Queue[Update]) 
     if status == 0 and taken:
         updates.put(Update(case, "finished", steps))
     else:
-        updates.put(Update(case, "crashed", steps, last if status > 0 and last else _ending(status)))
+        state: Literal["refused", "crashed"] = "refused" if status == REFUSED else "crashed"
+        updates.put(Update(case, state, steps, last if status > 0 and last else _ending(status)))
 
 
 def _ending(status: int) -> str:
