@@ -4,9 +4,9 @@ BIN := .venv/bin
 BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
 NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
 WEB := scripts/build-web.sh $(shell find web -type f -not -path '*/node_modules/*')
-FORMATTED := src tests benchmarks examples
+FORMATTED := src tests benchmarks examples docs
 
-.PHONY: run test wheel quick lint format stubs bench docs setup clean
+.PHONY: run test wheel quick lint format stubs bench docs site links setup clean
 
 run: setup  ## Run the bar; leaves a picture, a plot and a report below runs/
 	$(BIN)/qlb run bar
@@ -36,8 +36,14 @@ stubs: setup  ## Write the type stub of the compiled module again
 bench: setup  ## Benchmarks of a step and of the kernels; tables on the terminal
 	$(BIN)/python -m benchmarks
 
-docs: setup  ## Check that the snippets in README and docs run
-	$(BIN)/pytest tests/docs
+docs: setup site  ## Build the site into build/docs, and check that every snippet in README and docs runs
+	$(BIN)/pytest -n 2 tests/docs
+
+site: setup  ## Build the site alone; a warning, such as a link within it that leads nowhere, is an error
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+
+links: setup  ## Check links out of the site and the README; needs the network
+	$(BIN)/python -m sphinx -q -b linkcheck docs build/links
 
 wheel: setup  ## Build a wheel that needs no system packages, into dist/, and check it in a clean environment
 	./scripts/build-wheel.sh

@@ -31,4 +31,6 @@ struct CompressibleNeoHookean : InvariantMaterial<V, CompressibleNeoHookean<V>> 
   }
 };
 
+QLB_MATERIAL(CompressibleNeoHookean);
+
 }  // namespace qlb

@@ -67,4 +67,7 @@ struct FixedCorotational : CorotationalBase<V, true> {
   explicit FixedCorotational(const V* parameters) : CorotationalBase<V, true>{parameters[0], parameters[1]} {}
 };
 
+QLB_MATERIAL(FixedCorotational);
+QLB_MATERIAL(Arap);
+
 }  // namespace qlb

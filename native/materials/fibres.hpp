@@ -112,4 +112,7 @@ struct FibreStVK : FibreMaterial<V, FibreStVK<V>> {
   }
 };
 
+QLB_MATERIAL(FibreSqrtI5);
+QLB_MATERIAL(FibreStVK);
+
 }  // namespace qlb

@@ -53,4 +53,6 @@ struct LinearElastic {
   }
 };
 
+QLB_MATERIAL(LinearElastic);
+
 }  // namespace qlb

@@ -15,6 +15,9 @@
 // true`; it has no parameter_count, and M(const double* parameters, int stride, const Program&) reads the lanes itself.
 //
 // Where a material has both forms they are written down independently; a test holds one against the other.
+//
+// A header ends with QLB_MATERIAL(M); for each material in it. CMake writes the list of all of them, materials/all.hpp,
+// from these lines.
 #pragma once
 
 #include <limits>
@@ -22,7 +25,13 @@
 
 #include "simd/mat3.hpp"
 
+// Makes M known to the element kernels (see above).
+#define QLB_MATERIAL(M) static_assert(::qlb::is_material_template<M>)
+
 namespace qlb {
+
+template <template <class> class>
+inline constexpr bool is_material_template = true;
 
 enum class HessianForm {
   kStiffnessAndSpectrum,  // exact Hessians from stiffness(F), projected ones from spectrum(sigma)

@@ -40,4 +40,6 @@ struct MooneyRivlin : InvariantMaterial<V, MooneyRivlin<V>> {
   static V power(const V& J) { return xsimd::exp(V(-2.0 / 3.0) * log_or_nan(J)); }
 };
 
+QLB_MATERIAL(MooneyRivlin);
+
 }  // namespace qlb

@@ -30,4 +30,6 @@ struct StVenantKirchhoff : InvariantMaterial<V, StVenantKirchhoff<V>> {
   }
 };
 
+QLB_MATERIAL(StVenantKirchhoff);
+
 }  // namespace qlb

@@ -35,4 +35,6 @@ struct StableNeoHookean : InvariantMaterial<V, StableNeoHookean<V>> {
   }
 };
 
+QLB_MATERIAL(StableNeoHookean);
+
 }  // namespace qlb

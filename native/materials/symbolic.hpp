@@ -179,4 +179,7 @@ struct SymbolicWithI2 : ProgramMaterial<V, SymbolicWithI2<V>, true> {
   using ProgramMaterial<V, SymbolicWithI2<V>, true>::ProgramMaterial;
 };
 
+QLB_MATERIAL(Symbolic);
+QLB_MATERIAL(SymbolicWithI2);
+
 }  // namespace qlb

@@ -67,4 +67,6 @@ struct Viscous {
   }
 };
 
+QLB_MATERIAL(Viscous);
+
 }  // namespace qlb

@@ -20,6 +20,7 @@ from qlb import (
     Tolerance,
     Traction,
 )
+from qlb.solvers import SOLVERS
 from tests.support import Array, left_end, right_end
 
 LENGTH = 1.0
@@ -134,7 +135,7 @@ def test_the_body_moves_far_enough_to_tell(variant: str, integrator: str) -> Non
     assert np.abs(reference(variant, integrator)[-1] - MESH.positions).max() > 0.01
 
 
-@pytest.mark.parametrize("solver", ["ND", "QLF", "QLB", "QLA"])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_solvers_agree_on_the_bar_of_the_paper(solver: str) -> None:
     # Soft and nearly incompressible, and bending far.
     soft, settings = StableNeoHookean(young=2e4, poisson=0.49), {"max_iterations": 3000}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from qlb.materials import MATERIALS
 from tests.support import Array, random_rotation
 
 COUNT = 21  # not a multiple of any SIMD width
@@ -67,6 +68,5 @@ UNIQUE_ROTATION = [*UPRIGHT, "rank two"]
 
 def kinds_for(name: str) -> list[str]:
     """The kinds of F at which a material and its derivatives are defined."""
-    if name in ("CNH", "MR"):
-        return UPRIGHT
-    return UNIQUE_ROTATION if name in ("ARAP", "corotational") else list(KINDS)
+    domain = MATERIALS[name].domain if name in MATERIALS else "everywhere"
+    return {"everywhere": list(KINDS), "det F > 0": UPRIGHT, "unique R": UNIQUE_ROTATION}[domain]

@@ -268,3 +268,17 @@ def test_regions_are_the_mesh_s_own() -> None:
     assert mesh.regions.tolist() == REGIONS
     assert not mesh.regions.flags.writeable
     assert box.regions is None
+
+
+def test_a_stiffened_material_has_all_its_moduli_times_the_factor() -> None:
+    mesh = TetMesh.box(cells=(1, 1, 1))
+    factor = np.arange(1.0, 7.0)
+    for kind in MATERIALS.values():
+        material = kind(young="1e4 + x").on(mesh)
+        stiff = material.stiffened(factor)
+        F = np.eye(3) + 0.1 * np.random.default_rng(3).normal(size=(6, 3, 3))
+        for before, after in zip(material.evaluate(F), stiff.evaluate(F), strict=True):
+            np.testing.assert_allclose(
+                after, before * factor.reshape(-1, *[1] * (before.ndim - 1)), rtol=1e-10, atol=1e-9
+            )
+        assert stiff.density == material.density

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from qlb.integrators.integrator import Integrator, Stage, State, Steps
 from qlb.integrators.sdirk2 import SDIRK2
 
@@ -10,6 +12,7 @@ class BDF1(Integrator):
     """Backward Euler, of order 1 (supplement, eqs. 1-4)."""
 
     name = "BDF1"
+    order: ClassVar[int] = 1
 
     def step(self, state: State, h: float) -> Steps:
         """One stage: c = h, x_b = x_k, v_b = v_k."""
@@ -25,6 +28,7 @@ class BDF2(Integrator):
     """
 
     name = "BDF2"
+    order: ClassVar[int] = 2
 
     def step(self, state: State, h: float) -> Steps:
         """One stage: c = 2h/3, x_b = (4 x_k - x_{k-1})/3, v_b = (4 v_k - v_{k-1})/3."""

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 from qlb.arrays import FloatArray
 
@@ -77,6 +78,9 @@ class Integrator(ABC):
     """A time integrator; it knows no energy and no solver."""
 
     name: str
+
+    order: ClassVar[int]
+    """Of positions and velocities; 0 where nothing has a velocity of its own. The tests hold it to that."""
 
     @abstractmethod
     def step(self, state: State, h: float) -> Steps:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from qlb.integrators.integrator import Integrator, Stage, State, Steps
 
 
@@ -9,6 +11,7 @@ class Quasistatic(Integrator):
     """f(x) = 0 at each time (supplement, eqs. 5-6): no inertia, no damping."""
 
     name = "quasistatic"
+    order: ClassVar[int] = 0
 
     def step(self, state: State, h: float) -> Steps:
         """One stage without inertia; the velocity returned is the mean over the step."""

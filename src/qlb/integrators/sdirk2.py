@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import ClassVar
 
 from qlb.integrators.integrator import Integrator, Stage, State, Steps
 
@@ -14,6 +15,7 @@ class SDIRK2(Integrator):
     """Two stages of order 2, L-stable and stiffly accurate (supplement, eqs. 9-12). Both stages share c = a h."""
 
     name = "SDIRK2"
+    order: ClassVar[int] = 2
 
     def step(self, state: State, h: float) -> Steps:
         """Stage 1 at t + a h from x_k, v_k; stage 2 at t + h from x_k + (1-a) h v_1, v_k + (1-a)/a (v_1 - v_k)."""

@@ -1,6 +1,6 @@
 """Hyperelastic materials. Each is one class here and one header in native/materials."""
 
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, TypeAlias, Union
 
 from pydantic import Discriminator, Tag
 
@@ -13,6 +13,7 @@ from qlb.materials.mooney_rivlin import MooneyRivlin
 from qlb.materials.st_venant_kirchhoff import StVenantKirchhoff
 from qlb.materials.stable_neo_hookean import StableNeoHookean
 from qlb.materials.symbolic import SymbolicMaterial
+from qlb.registry import found_in
 
 
 def _model_of(value: object) -> str:
@@ -20,22 +21,28 @@ def _model_of(value: object) -> str:
     return str(value.get("model", "SNH") if isinstance(value, dict) else getattr(value, "model", None))
 
 
-AnyMaterial = Annotated[
-    Annotated[StableNeoHookean, Tag("SNH")]
-    | Annotated[StVenantKirchhoff, Tag("StVK")]
-    | Annotated[CompressibleNeoHookean, Tag("CNH")]
-    | Annotated[FixedCorotational, Tag("corotational")]
-    | Annotated[Arap, Tag("ARAP")]
-    | Annotated[MooneyRivlin, Tag("MR")]
-    | Annotated[LinearElastic, Tag("linear")],
-    Discriminator(_model_of),
-]
-"""Any material of a scene file, told apart by `model`: the one list of them."""
+def _name_of(kind: type[Material]) -> str | None:
+    default = kind.model_fields["model"].default
+    return default if isinstance(default, str) else None
 
-MATERIALS: dict[str, type[Material]] = {
-    tag.tag: material for material, tag in map(get_args, get_args(get_args(AnyMaterial)[0]))
-}
-"""Every material by the name that scene files use."""
+
+MATERIALS: dict[str, type[Material]] = found_in(
+    __name__,
+    Material,  # type: ignore[type-abstract]
+    _name_of,
+    first=("SNH", "StVK", "CNH", "corotational", "ARAP", "MR", "linear"),
+    skip="symbolic*",
+)
+"""Every material by the name that scene files use. Densities of one's own are for scripts alone."""
+
+if TYPE_CHECKING:
+    AnyMaterial: TypeAlias = Material
+else:
+    AnyMaterial = Annotated[
+        Union[tuple(Annotated[kind, Tag(name)] for name, kind in MATERIALS.items())],  # noqa: UP007
+        Discriminator(_model_of),
+    ]
+"""Any material of a scene file, told apart by `model`."""
 
 __all__ = [
     "MATERIALS",

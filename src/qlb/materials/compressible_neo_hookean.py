@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-from qlb.materials.material import IsotropicMaterial
+from qlb.materials.material import Domain, IsotropicMaterial
 
 
 class CompressibleNeoHookean(IsotropicMaterial):
@@ -13,4 +13,5 @@ class CompressibleNeoHookean(IsotropicMaterial):
     psi = mu/2 (I_C - 3) - mu log J + lambda/2 log(J)^2 (Bonet, Wood 2008, eq. 6.27), not defined for J <= 0.
     """
 
+    domain: ClassVar[Domain] = "det F > 0"
     model: Literal["CNH"] = "CNH"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-from qlb.materials.material import IsotropicMaterial, Material
+from qlb.materials.material import Domain, IsotropicMaterial, Material
 from qlb.settings import PerElement, quantity
 
 
@@ -14,6 +14,7 @@ class FixedCorotational(IsotropicMaterial):
     psi = mu |F - R|^2 + lambda/2 (J - 1)^2, R the rotation nearest to F.
     """
 
+    domain: ClassVar[Domain] = "unique R"
     model: Literal["corotational"] = "corotational"
 
 
@@ -23,6 +24,7 @@ class Arap(Material):
     psi = mu |F - R|^2, R the rotation nearest to F, mu = young/2.
     """
 
+    domain: ClassVar[Domain] = "unique R"
     model: Literal["ARAP"] = "ARAP"
     young: PerElement = quantity(2e4, "Young's modulus", unit="Pa", gt=0)
 

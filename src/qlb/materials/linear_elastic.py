@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from qlb.materials.material import IsotropicMaterial
 
@@ -13,4 +13,5 @@ class LinearElastic(IsotropicMaterial):
     psi = mu eps:eps + lambda/2 (tr eps)^2, eps = (F + F^T)/2 - 1.
     """
 
+    objective: ClassVar[bool] = False
     model: Literal["linear"] = "linear"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Self
+from typing import ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from qlb.fields import Varying
 from qlb.mesh.tet_mesh import TetMesh
 from qlb.settings import PerElement, Settings, on_mesh, quantity, require_numbers
 
+Domain: TypeAlias = Literal["everywhere", "det F > 0", "unique R"]
+"""Everywhere; or where no element is inverted; or where the rotation nearest to F is unique."""
+
 
 class Material(Settings):
     """A hyperelastic solid: an energy density psi(F) [Pa] and a mass density.
@@ -22,6 +25,12 @@ class Material(Settings):
     Any parameter may be one number, or vary in space: an array with one value per element, a table by region, an
     expression or a function of the rest position (see `PerElement`). What varies has its values on a mesh: `on`.
     """
+
+    domain: ClassVar[Domain] = "everywhere"
+    """Where psi and its derivatives are defined. Tests take deformation gradients from there, the docs say it."""
+
+    objective: ClassVar[bool] = True
+    """Whether psi(R F) = psi(F) for each rotation R."""
 
     model: str
     """Short name, as in scene files."""
@@ -60,6 +69,12 @@ class Material(Settings):
             InputError: a parameter that does not fit the mesh or is out of range; the element or region is named.
         """
         return on_mesh(self, "material", mesh)
+
+    def stiffened(self, factor: FloatArray) -> Self:
+        """The same material, `factor` times as stiff in each element (m,), after `on`: all that is in Pa times it."""
+        units = {name: field.json_schema_extra for name, field in type(self).model_fields.items()}
+        stiff = [name for name, extra in units.items() if isinstance(extra, dict) and extra.get("unit") == "Pa"]
+        return self.model_copy(update={name: factor * getattr(self, name) for name in stiff})
 
     def parameter_table(self, elements: int) -> FloatArray:
         """`kernel_parameters` for each element, shape (elements, count).

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-from qlb.materials.material import IsotropicMaterial
+from qlb.materials.material import Domain, IsotropicMaterial
 from qlb.settings import PerElement, quantity
 
 
@@ -15,6 +15,7 @@ class MooneyRivlin(IsotropicMaterial):
     J <= 0. 2 (c1 + c2) = mu and kappa = lambda + 2/3 mu are those of `young` and `poisson`.
     """
 
+    domain: ClassVar[Domain] = "det F > 0"
     model: Literal["MR"] = "MR"
     second_share: PerElement = quantity(0.25, "c2/(c1 + c2), the part of the second invariant", ge=0, le=1)
 

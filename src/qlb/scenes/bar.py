@@ -68,8 +68,7 @@ class BarScene(Scene):
         if self.heterogeneous:
             x = mesh.centroids()[:, 0]
             slab = np.floor(8 * (x - mesh.positions[:, 0].min()) / np.ptp(mesh.positions[:, 0]))
-            young = np.where(slab % 2 == 1, 10.0, 1.0) * self.material.on(mesh).young
-            arguments["material"] = self.material.model_copy(update={"young": young})
+            arguments["material"] = self.material.on(mesh).stiffened(np.where(slab % 2 == 1, 10.0, 1.0))
         if self.anisotropic and self.fibres is None:
-            arguments["fibres"] = (Fibres(modulus=2 * self.material.on(mesh).young, direction=(1.0, 1.0, 0.0)),)
+            arguments["fibres"] = (Fibres(modulus=2 * self.material.on(mesh).modulus(), direction=(1.0, 1.0, 0.0)),)
         return arguments

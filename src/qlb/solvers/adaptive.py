@@ -27,7 +27,7 @@ CROWD = 600  # terms of contact from which on the factor takes them in
 
 
 class QLA(FactoredLbfgs):
-    """The factor is of the Hessian B at some earlier initial guess, carried along: B^-1 becomes T B^-1 T^T.
+    """L-BFGS over a factor that is kept: of B, the Hessian at some earlier initial guess, carried along as T B^-1 T^T.
 
     T is block-diagonal, for each node between the rotation R and the affine map A that the material around it has been
     through since then. R keeps shear and inertia as they are; A takes what keeps volumes to what keeps volumes, since

@@ -59,7 +59,7 @@ class FactoredLbfgs(Descent):
 
 
 class QLF(FactoredLbfgs):
-    """B is the Hessian at the start of the simulation, for the whole run.
+    """L-BFGS over the factor of B, the Hessian at the start of the simulation, for the whole run.
 
     c is part of the Hessian, so a stage with another c (the SDIRK2 step that starts BDF2) has it factorised with its
     own c, at the same positions. Contact has no part in it: when it is made again, for another c or in a resumed run,
@@ -91,7 +91,7 @@ class QLF(FactoredLbfgs):
 
 
 class QLB(FactoredLbfgs):
-    """B is the Hessian at the beginning of each step.
+    """L-BFGS over the factor of B, the Hessian at the beginning of each step.
 
     Stages of one step with the same c (both of SDIRK2) share it. The supplement names QLB without defining it; this is
     our reading.
