@@ -245,7 +245,7 @@ def test_a_run_with_contact_shows_it(qlb, tmp_path):
     assert f"{summary['minimum_distance']:.4g} m" in page
     status, out, _ = qlb("run", "bar", *SMALL, "--out", "bar", "--no-picture")
     assert "contact.png" not in out
-    assert "dhat" not in (tmp_path / "bar" / "report.html").read_text()
+    assert '"contact":{"steps"' not in (tmp_path / "bar" / "report.html").read_text()
 
 
 def test_a_check_that_finds_an_intersection_ends_the_run_with_status_1(qlb, tmp_path):

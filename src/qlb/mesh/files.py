@@ -62,7 +62,7 @@ class MeshFile:
         if arrays["points"].ndim != 2 or arrays["points"].shape[1] != 3:
             raise InputError(f"mesh file {path} has points of shape {arrays['points'].shape}, must be (n, 3)")
         tets, triangles = (_indices(path, arrays[name], len(arrays["points"])) for name in ("tets", "triangles"))
-        regions = _whole(arrays.get("regions"))
+        regions = arrays.get("regions")
         return MeshFile(path, arrays["points"], tets, triangles, regions, tuple(header["kinds"]))
 
     def used_tets(self) -> tuple[FloatArray, IntArray, LongArray | None]:
@@ -119,10 +119,3 @@ def _indices(path: Path, cells: np.ndarray, points: int) -> LongArray:
         bad = cells.min() if cells.min() < 0 else cells.max()
         raise InputError(f"mesh file {path}: node index {bad} is outside its {points} nodes")
     return cells.astype(np.int64)
-
-
-def _whole(values: np.ndarray | None) -> LongArray | None:
-    """Region ids, where they are whole numbers."""
-    if values is None or values.ndim != 1 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-        return None
-    return values.astype(np.int64) if (np.floor(values) == values).all() else None

@@ -35,7 +35,7 @@ SPARE_MEMORY = 2 << 30
 MEMORY_PER_BYTE = 50
 """Reading may take so much memory [bytes], and so many bytes for each byte of the file."""
 REGION_DATA = ("region", "gmsh:physical", "medit:ref")
-"""Cell data that hold the region of each tet, the first that a file has: our own, gmsh's, Medit's."""
+"""Cell data that hold the region of each tet, the first whole numbers that a file has: our own, gmsh's, Medit's."""
 TRIMESH = (".obj", ".stl", ".ply", ".off", ".gltf", ".glb")
 USD = (".usd", ".usda", ".usdc", ".usdz")
 
@@ -118,9 +118,10 @@ def _read_meshio(path: Path) -> tuple[dict[str, Any], Arrays]:
     for name in REGION_DATA:
         if name in data.cell_data:
             given = zip(data.cells, data.cell_data[name], strict=True)
-            values = [np.asarray(v) for block, v in given if block.type == "tetra"]
-            arrays["regions"] = np.concatenate(values) if values else np.empty(0)
-            break
+            values = np.concatenate([np.empty(0), *(np.asarray(v) for block, v in given if block.type == "tetra")])
+            if values.ndim == 1 and np.isfinite(values).all() and (np.floor(values) == values).all():
+                arrays["regions"] = values.astype(np.int64)
+                break
     return {"kinds": sorted({kind for kind, _ in blocks})}, arrays
 
 
