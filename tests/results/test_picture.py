@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 import qlb
-from qlb.results import MissingExtra, RenderingFailed, picture, render_frames, rendering
+from qlb.mesh.closest import embed
+from qlb.results import MissingExtra, RenderingFailed, Run, RunWriter, picture, render_frames, rendering
 
 
 @pytest.mark.usefixtures("can_render")
@@ -76,3 +77,20 @@ def test_times_have_the_decimals_they_need():
     assert picture._time_texts([0.2, 1.0]) == ["t = 0.2 s", "t = 1.0 s"]
     assert picture._time_texts([1.0, 3.0000000000000004]) == ["t = 1 s", "t = 3 s"]
     assert picture._time_texts([1 / 3]) == ["t = 0.333333 s"]
+
+
+def test_what_is_drawn_is_the_embedded_surface(tmp_path):
+    mesh = qlb.TetMesh.box((1, 1, 1), cells=(1, 1, 1))
+    # One triangle in the middle of the box, which no boundary has.
+    corners = np.array([[0.4, 0.5, 0.5], [0.6, 0.5, 0.5], [0.5, 0.6, 0.5]])
+    fine = mesh.with_surface(embed(mesh, corners, [[0, 1, 2]]).surface)
+    simulation = qlb.Simulation(fine, material=qlb.StableNeoHookean(), gravity=(0, -10, 0), step=0.1, threads=1)
+    with RunWriter(tmp_path / "run", {"scene": "mine"}, simulation) as writer:
+        writer.record(simulation.advance())
+    run = Run(tmp_path / "run")
+    drawn = picture._Surface.of(run, [run.frame(0), run.frame(1)])
+    np.testing.assert_array_equal(drawn.triangles, [[0, 1, 2]])
+    np.testing.assert_allclose(drawn.rest, corners, atol=1e-12)
+    np.testing.assert_allclose(drawn.deformed[0], corners, atol=1e-12)
+    fallen = run.frame(1).positions - run.frame(0).positions
+    assert drawn.largest == pytest.approx(-fallen[:, 1].mean(), rel=1e-6)  # it falls as a whole

@@ -46,11 +46,11 @@ def load(name: str) -> Arrays | None:
     if place is None:
         return None
     try:
-        with np.load(place / f"{name}.npz", allow_pickle=False) as file:
-            return {member: file[member] for member in file.files}
+        with (place / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as members:
+            return {member: members[member] for member in members.files}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile) as error:
         _log.info("the cached mesh %s is damaged and made again: %s", name, error)
         return None
 

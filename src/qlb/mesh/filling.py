@@ -177,6 +177,7 @@ class _Task:
         for _ in range(RUNS):
             mesh = self.run(share)
             number = log(len(mesh.tets))
+            _log.debug("%s: %d tets at edges of %.3g diagonals", self.name, len(mesh.tets), share)
             tried.append((abs(number - log(wanted)), number, mesh, share))
             if tried[-1][0] < CLOSE:
                 break
