@@ -110,7 +110,8 @@ BOMBS = {
     "bomb.off": b"OFF\n1000000000000 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
     "bomb.stl": bytes(80) + b"\xff\xff\xff\x7f" + bytes(50),
     "bomb.msh": b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000000\n1 0 0 0\n$EndNodes\n",
-    "bomb4.msh": b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1000000000000 1 1000000000000\n3 1 0 1000000000000\n",
+    "bomb4.msh": b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n"
+    b"1 1000000000000 1 1000000000000\n3 1 0 1000000000000\n",
     "bomb.vtk": b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 1000000000000 double\n0\n",
     "bomb.mesh": b"MeshVersionFormatted 2\nDimension 3\nVertices\n1000000000000\n0 0 0 1\n",
     "index.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 1000000000000\n",

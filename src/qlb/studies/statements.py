@@ -190,7 +190,8 @@ def _means(measured: Measured, solver: str) -> dict[str, float]:
 def _listed(means: Mapping[str, Mapping[str, float]]) -> str:
     """As in "QLF: 185 (E = 6e3 Pa), 235 (E = 2e4 Pa)"."""
     rows = (
-        f"{solver}: " + ", ".join(f"{mean:.3g} ({label})" for label, mean in row.items()) for solver, row in means.items()
+        f"{solver}: " + ", ".join(f"{mean:.3g} ({label})" for label, mean in row.items())
+        for solver, row in means.items()
     )
     return "; ".join(rows)
 
