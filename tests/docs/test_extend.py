@@ -22,7 +22,7 @@ from qlb import _native
 ROOT = Path(__file__).parents[2]
 EXTEND = ROOT / "docs" / "extend"
 BLOCK = re.compile(r"^```\{code-block\} \w+\n(?::caption: (\S+)\n)?(.*?)^```", re.DOTALL | re.MULTILINE)
-TREE = ["src", "native", "tests", "docs", "CMakeLists.txt", "pyproject.toml"]
+TREE = ["src", "native", "tests", "docs", "examples", "CMakeLists.txt", "pyproject.toml"]
 
 
 @dataclass
