@@ -11,7 +11,8 @@ import pytest
 
 import qlb
 from qlb.results import Run, write_figure
-from qlb.results.figure import FORMATS, draw_grid
+from qlb.results.figure import FORMATS
+from qlb.results.figure_drawing import draw_grid
 from qlb.scenes import load_scene
 from qlb.studies import FIGURES, Plan, Reproduction, Update, chosen_figures, plan_figures, reproduce
 from qlb.studies import processes as processes_module

@@ -8,7 +8,7 @@ from pathlib import Path
 from qlb.cli.output import console
 from qlb.errors import InputError
 from qlb.results import Run, finish_run, layout
-from qlb.results.figure_page import PAGE
+from qlb.results.figure import PAGE
 
 _MADE_FROM = (layout.SUMMARY, layout.STATS)
 

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from qlb.results.figure import FigureGrid
+from qlb.results.figure import PAGE, FigureGrid
 from qlb.results.files import write_text
 from qlb.results.report import data_uri, template
 from qlb.results.run import Run
 from qlb.results.wording import Verdict, common, flatten
-
-PAGE = "index.html"
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from qlb import results
 from qlb.errors import InputError
 from qlb.results import Run
-from qlb.results.figure import FORMATS, FigureGrid, write_figure
-from qlb.results.figure_page import PAGE, write_figures_page
+from qlb.results.figure import FORMATS, PAGE, FigureGrid
 from qlb.scenes import load_scene
 from qlb.studies.folder import RUNS, StudyKind, claim_folder, is_complete, run_of
 from qlb.studies.processes import Case, Update, run_cases
@@ -149,9 +149,9 @@ def reproduce(
         return Reproduction(plan.directory, [], problems, interrupted=True)
     grids = list(_grids(plan))
     for grid in grids:
-        write_figure(grid, plan.directory)
+        results.write_figure(grid, plan.directory)
     notes = _NOTES if plan.overrides else (*_NOTES, _REFERENCE_NOTE)
-    page = write_figures_page(grids, plan.directory, problems, notes)
+    page = results.write_figures_page(grids, plan.directory, problems, notes)
     return Reproduction(plan.directory, grids, problems, page=page)
 
 
