@@ -23,6 +23,7 @@ MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
 CROWD = 600  # terms beside the factor from which on it takes them in
+RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
 OUTSIDE = 100  # terms that do not fit into its pattern, from which on it is extended for them
 NO_TERMS = _native.RankOneTerms(np.empty((0, 4), dtype=np.int32), np.empty((0, 4, 3)), np.empty(0))
 
@@ -40,7 +41,7 @@ class QLA(FactoredLbfgs):
     contact, whose Hessian of the moment is known.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
-    cost of a solve with this factor, or when the terms beside it have cost as much as a new one; within a solve, when
+    cost of a solve with this factor, or when the terms beside it have cost some times a new one; within a solve, when
     the iterations that are still to come cost more, or when these terms are too many. A cost is counted in iterations,
     from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
     """
@@ -196,11 +197,13 @@ class QLA(FactoredLbfgs):
     def end_solve(self) -> None:
         """Decide whether the next solve needs a new factor.
 
-        It does where this one cost more than the mean with this factor, or the terms beside it as much as a new one.
+        It does where this one cost more than the mean with this factor, or the terms beside it some times a new one.
         """
         iterations = self._iterations - self._marked_at
         self._solves += 1
-        self._stale = iterations > (self.kappa + self._spent + iterations) / self._solves or self._beside > self.kappa
+        self._stale = (
+            iterations > (self.kappa + self._spent + iterations) / self._solves or self._beside > RENT * self.kappa
+        )
         self._spent += iterations
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
