@@ -59,7 +59,7 @@ def test_a_run_cut_in_two_in_the_middle_of_contact_gives_the_same_bits(solver):
 
 @pytest.mark.parametrize("crowd", [3, 12])
 def test_so_does_one_whose_factor_is_analysed_anew_for_its_contacts(crowd, monkeypatch):
-    """From `crowd` terms beside its factor on QLA takes them in, into a pattern that grows with the pairs that touch."""
+    """From `crowd` terms on QLA's factor takes them in, with a pattern that grows with the pairs that touch."""
     monkeypatch.setattr("qlb.solvers.adaptive.CROWD", crowd)
     monkeypatch.setattr("qlb.solvers.adaptive.OUTSIDE", 0)
     whole, first = two_cubes("QLA"), two_cubes("QLA")

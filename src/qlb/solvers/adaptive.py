@@ -23,6 +23,7 @@ MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
 CROWD = 600  # terms beside the factor from which on it takes them in
+COLUMN = 0.02  # cost of the half-solves of a node, in iterations
 RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
 OUTSIDE = 100  # terms that do not fit into its pattern, from which on it is extended for them
 NO_TERMS = _native.RankOneTerms(np.empty((0, 4), dtype=np.int32), np.empty((0, 4, 3)), np.empty(0))
@@ -65,6 +66,7 @@ class QLA(FactoredLbfgs):
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
         self._base: ContactBase | None = None  # the contacts in it
         self._solves = self._spent = 0  # solves with this factor, and their iterations
+        self._has_column = np.zeros(system.nodes, dtype=bool)  # nodes with half-solves over this factor
         self._beside = 0.0  # cost of the terms beside this factor, in iterations
         self._stale = False
 
@@ -136,7 +138,7 @@ class QLA(FactoredLbfgs):
         not help, it has to do by itself.
         """
         given = problem.contact_terms(point.x, contact)
-        terms, done = self._beside_factor(problem, contact, given)
+        terms, done = self._beside_factor(problem, contact, given, most=self.kappa)
         anew = not done
         while anew:
             self._refactor(problem, point, self.settings.projection)
@@ -152,16 +154,25 @@ class QLA(FactoredLbfgs):
         return terms, known
 
     def _beside_factor(
-        self, problem: StageProblem, contact: ContactPoint, given: Terms
+        self, problem: StageProblem, contact: ContactPoint, given: Terms, most: float = inf
     ) -> tuple[_native.RankOneTerms, bool]:
-        """Terms by which contact differs from what the factor holds; whether they are few enough, and definite."""
+        """Terms by which contact differs from what the factor holds; whether they are in place beside it.
+
+        They are not where they are too many, half-solves for their nodes cost more than `most` iterations, or the sum
+        is not definite.
+        """
         assert self._low_rank is not None
         assert self._base is not None
         lacking, change = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
         terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), change))
-        count = int(np.count_nonzero(terms.stiffness))
-        self._beside += cost_of_terms(count, *self._measures)
-        return terms, count <= CROWD and self._low_rank.set_terms(terms, len(change[2]))
+        beside = np.flatnonzero(terms.stiffness)
+        nodes = np.unique(terms.nodes[beside])
+        new = COLUMN * np.count_nonzero(~self._has_column[nodes])
+        if len(beside) > CROWD or new > most:
+            return terms, False
+        self._has_column[nodes] = True
+        self._beside += new + cost_of_terms(len(beside), *self._measures)
+        return terms, self._low_rank.set_terms(terms, len(change[2]))
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
@@ -228,7 +239,7 @@ class QLA(FactoredLbfgs):
         account = np.array([*self._kind, self._solves, self._spent, self._beside, *flags], dtype=np.float64)
         saved |= {"reference": self._reference, "account": account}
         if self._base is not None:
-            saved |= self._base.save()
+            saved |= self._base.save() | {"has_column": self._has_column.astype(np.float64)}
         if factor.shifted or not self.system.hessian_is_of_positions:
             saved["matrix"] = factor.matrix_values()  # many times larger; else it follows from the reference
         return saved
@@ -250,6 +261,7 @@ class QLA(FactoredLbfgs):
             values = then.hessian(self._reference, project=bool(projected)).values
         if self._low_rank is not None:
             self._base = ContactBase.load(arrays)
+            self._has_column = arrays["has_column"] != 0
         contact = None if self._base is None else self._base.held
         self.factor.restore(values, projected=bool(projected), raised=bool(raised), contact=contact)
 
@@ -275,6 +287,7 @@ class QLA(FactoredLbfgs):
         self._reference, self._kind = point.x, _kind(problem)
         self._solves = self._spent = 0
         self._beside = 0.0
+        self._has_column[:] = False
         self._stale = False
         self._mark(point)
 
