@@ -247,7 +247,8 @@ class QLA(FactoredLbfgs):
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take it back, and factorise again."""
         super().load(arrays)
-        self._over_factor()
+        if self.factor.cholesky is not self._analysed:
+            self._over_factor()
         self._base = None
         self._reference = arrays.get("reference")
         if self._reference is None:
@@ -262,6 +263,9 @@ class QLA(FactoredLbfgs):
         if self._low_rank is not None:
             self._base = ContactBase.load(arrays)
             self._has_column = arrays["has_column"] != 0
+        if self._low_rank is not None:
+            self._low_rank.forget()
+        self._carried.reset()
         contact = None if self._base is None else self._base.held
         self.factor.restore(values, projected=bool(projected), raised=bool(raised), contact=contact)
 
