@@ -146,8 +146,7 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
     if (terms_.vector(j, i) == kZero || columns.held(node)) continue;
     const std::int32_t column = columns.find(node);
     const bool framed = j >= terms_.size() - framed_;
-    const std::array<double, 3> vector =
-        framed ? terms_.vector(j, i) : frame_.pull_back_at(node, terms_.vector(j, i));
+    const std::array<double, 3> vector = framed ? terms_.vector(j, i) : frame_.pull_back_at(node, terms_.vector(j, i));
     const auto end = term.column + term.count;
     const auto at = std::find(term.column, end, column) - term.column;
     if (at == term.count) {

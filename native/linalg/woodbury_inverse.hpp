@@ -81,7 +81,7 @@ class WoodburyInverse : public InverseOperator {
   AnyColumns columns_;
   std::int64_t version_ = -1;  // of the factor that the columns belong to
   RankOneTerms terms_;
-  std::int64_t framed_ = 0;  // how many of the last terms are in the frame of the factor
+  std::int64_t framed_ = 0;         // how many of the last terms are in the frame of the factor
   std::vector<Active> active_;      // the positive ones first
   std::vector<std::int32_t> used_;  // columns in use, in elimination order
   DenseCholesky small_;
