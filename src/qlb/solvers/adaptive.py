@@ -26,7 +26,6 @@ CROWD = 600  # terms beside the factor from which on it takes them in
 COLUMN = 0.02  # cost of the half-solves of a node, in iterations
 RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
 OUTSIDE = 100  # terms that do not fit into its pattern, from which on it is extended for them
-NO_TERMS = _native.RankOneTerms(np.empty((0, 4), dtype=np.int32), np.empty((0, 4, 3)), np.empty(0))
 
 
 class QLA(FactoredLbfgs):
@@ -108,7 +107,7 @@ class QLA(FactoredLbfgs):
         if self.settings.carry_factor:
             with problem.timer.section("solve"):
                 if self._low_rank is not None:
-                    self._low_rank.set_terms(NO_TERMS)
+                    self._low_rank.set_terms(_no_terms())
                 self._carried.carry(point.x, self._reference, self._stretch)
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
@@ -333,6 +332,10 @@ def _secant_gradient(point: Point) -> FloatArray:
     if point.contact is None or point.contact.sliding is None:
         return point.smooth
     return point.smooth + point.contact.sliding
+
+
+def _no_terms() -> _native.RankOneTerms:
+    return _native.RankOneTerms(np.empty((0, 4), dtype=np.int32), np.empty((0, 4, 3)), np.empty(0))
 
 
 def stretch_weight(incompressibility: float) -> float:
