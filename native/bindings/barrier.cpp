@@ -107,6 +107,7 @@ void bind_friction(nb::module_& m) {
   property(terms, "gamma", &FrictionTerms::gamma);
   property(terms, "axis", &FrictionTerms::axis);
   property(terms, "stiffness", &FrictionTerms::stiffness);
+  property(terms, "slip", &FrictionTerms::slip);
 
   nb::class_<Friction>(m, "Friction", "Smooth Coulomb friction with lagged normal forces.")
       .def(

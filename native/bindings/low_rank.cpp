@@ -90,8 +90,19 @@ void bind_low_rank(nb::module_& m) {
           nb::arg("x"), nb::arg("reference"), nb::arg("weight"), ReleaseGil(),
           "Maps from how the material has moved since the factor was made at `reference`; the terms stay.")
       .def("reset", &WoodburyInverse::reset, ReleaseGil(), "Maps of one; the terms stay.")
-      .def("set_terms", &WoodburyInverse::set_terms, nb::arg("terms"), ReleaseGil(),
-           "Replaces the terms. False where the sum is not positive definite: it then goes on without any.")
+      .def("set_terms", &WoodburyInverse::set_terms, nb::arg("terms"), nb::arg("framed") = 0, ReleaseGil(),
+           "Replaces the terms; the last `framed` of them are in the frame of the factor as they are. False where the "
+           "sum is not positive definite: it then goes on without any.")
+      .def(
+          "pull_back",
+          [](const WoodburyInverse& op, const Array<const std::int32_t>& nodes, const Array<const double>& vectors,
+             const Array<double>& out) {
+            const auto size = static_cast<std::int64_t>(3 * nodes.size());
+            sized(vectors, size, "vectors");
+            op.pull_back(view(nodes), view(vectors), sized(out, size, "out"));
+          },
+          nb::arg("nodes"), nb::arg("vectors"), nb::arg("out").noconvert(), ReleaseGil(),
+          "out = vectors at their nodes in the frame of the factor; shapes (k, 4, 3), nodes (k, 4).")
       .def("forget", &WoodburyInverse::forget,
            "Drops the terms and the half-solves kept: for when the factor is made anew.")
       .def_prop_ro("terms", &WoodburyInverse::terms)

@@ -61,6 +61,7 @@ FrictionTerms Friction::evaluate(const double* x, const double* base, std::int64
     const double c1 = y > 0.0 ? u1 / y : 1.0, c2 = y > 0.0 ? u2 / y : 0.0, unit = scale * c.limit;
     const Vec3 along = c1 * t1 + c2 * t2, across = c1 * t2 - c2 * t1;
     const Derivatives f = smooth_friction(y, epsilon);
+    terms.slip.push_back({y * along.x, y * along.y, y * along.z});
     terms.energy += unit * f.value;
     for (int i = 0; i < 4; ++i)
       add3(unit * f.first * c.gamma[i] * along, gradient + 3 * static_cast<std::int64_t>(c.nodes[i]));

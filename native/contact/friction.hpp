@@ -26,6 +26,7 @@ struct FrictionTerms {
   std::vector<std::array<double, 4>> gamma;
   std::vector<std::array<double, 3>> axis;
   std::vector<double> stiffness;
+  std::vector<std::array<double, 3>> slip;  // of each contact, u [m]
 };
 
 class Friction {

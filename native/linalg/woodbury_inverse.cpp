@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 namespace qlb {
 namespace {
@@ -59,11 +60,24 @@ std::int64_t WoodburyInverse::bytes() const {
       columns_);
 }
 
-bool WoodburyInverse::set_terms(RankOneTerms terms) {
+bool WoodburyInverse::set_terms(RankOneTerms terms, std::int64_t framed) {
   terms.check_nodes(frame_.nodes());
+  if (framed < 0 || framed > terms.size())
+    throw std::invalid_argument("framed is " + std::to_string(framed) + ", must be 0 to the number of terms");
   factor_->check_ready();
   terms_ = std::move(terms);
+  framed_ = framed;
   return express_terms();
+}
+
+void WoodburyInverse::pull_back(std::span<const std::int32_t> nodes, std::span<const double> vectors,
+                                double* out) const {
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    if (nodes[k] < 0 || nodes[k] >= frame_.nodes())
+      throw std::invalid_argument("nodes name node " + std::to_string(nodes[k]));
+    const std::array<double, 3> v{vectors[3 * k], vectors[3 * k + 1], vectors[3 * k + 2]};
+    std::ranges::copy(v == kZero ? v : frame_.pull_back_at(nodes[k], v), out + 3 * k);
+  }
 }
 
 bool WoodburyInverse::express_terms() {
@@ -131,7 +145,8 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
     const std::int32_t node = terms_.nodes(j)[i];
     if (terms_.vector(j, i) == kZero || columns.held(node)) continue;
     const std::int32_t column = columns.find(node);
-    const std::array<double, 3> vector = frame_.pull_back_at(node, terms_.vector(j, i));
+    const bool framed = j >= terms_.size() - framed_;
+    const std::array<double, 3> vector = framed ? terms_.vector(j, i) : frame_.pull_back_at(node, terms_.vector(j, i));
     const auto end = term.column + term.count;
     const auto at = std::find(term.column, end, column) - term.column;
     if (at == term.count) {

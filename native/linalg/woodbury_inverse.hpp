@@ -30,9 +30,12 @@ class WoodburyInverse : public InverseOperator {
   void carry(const double* x, const double* reference, double weight);
   void reset();
 
-  // Replaces the terms; negative ones take away. Returns false, and goes on without any, where the sum is not positive
-  // definite: with negative terms alone can that be.
-  bool set_terms(RankOneTerms terms);
+  // Replaces the terms; negative ones take away. The last `framed` of them are in the frame of the factor as they are.
+  // Returns false, and goes on without any, where the sum is not positive definite: with negative terms alone can that
+  // be.
+  bool set_terms(RankOneTerms terms, std::int64_t framed = 0);
+  // T_i^T a_i at the nodes of each term, a of shape (terms, 4, 3).
+  void pull_back(std::span<const std::int32_t> nodes, std::span<const double> vectors, double* out) const;
   // Drops the terms and all that was kept: for when the factor is made anew.
   void forget();
 
@@ -78,6 +81,7 @@ class WoodburyInverse : public InverseOperator {
   AnyColumns columns_;
   std::int64_t version_ = -1;  // of the factor that the columns belong to
   RankOneTerms terms_;
+  std::int64_t framed_ = 0;         // how many of the last terms are in the frame of the factor
   std::vector<Active> active_;      // the positive ones first
   std::vector<std::int32_t> used_;  // columns in use, in elimination order
   DenseCholesky small_;

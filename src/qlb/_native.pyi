@@ -169,6 +169,9 @@ class FrictionTerms:
     @property
     def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
 
+    @property
+    def slip(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
+
 class Friction:
     """Smooth Coulomb friction with lagged normal forces."""
 
@@ -444,9 +447,14 @@ class WoodburyInverse(InverseOperator):
     def reset(self) -> None:
         """Maps of one; the terms stay."""
 
-    def set_terms(self, terms: RankOneTerms) -> bool:
+    def set_terms(self, terms: RankOneTerms, framed: int = 0) -> bool:
         """
-        Replaces the terms. False where the sum is not positive definite: it then goes on without any.
+        Replaces the terms; the last `framed` of them are in the frame of the factor as they are. False where the sum is not positive definite: it then goes on without any.
+        """
+
+    def pull_back(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], vectors: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """
+        out = vectors at their nodes in the frame of the factor; shapes (k, 4, 3), nodes (k, 4).
         """
 
     def forget(self) -> None:

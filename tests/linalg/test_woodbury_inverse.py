@@ -151,6 +151,27 @@ def test_inverse_is_that_of_the_dense_sum(precision: str, count: int, carried: b
     assert_close(dense_inverse(body), body.expected(terms), precision)
 
 
+def test_terms_in_the_frame_of_the_factor_are_those_that_were_brought_there(precision: str) -> None:
+    body = Body(precision)
+    body.carry()
+    terms = body.terms(40)
+    vectors = terms.gamma[:, :, None] * terms.axis[:, None, :]
+    framed = np.full_like(vectors, np.nan)
+    body.inverse.pull_back(terms.nodes, vectors, framed)
+    assert np.abs(framed - vectors).max() > 0.1
+    vectors[25:] = framed[25:]
+    assert body.inverse.set_terms(_native.RankOneTerms(terms.nodes, vectors, terms.stiffness), framed=15)
+    assert_close(dense_inverse(body), body.expected(terms), precision)
+
+
+def test_terms_and_nodes_that_do_not_exist_are_refused() -> None:
+    body = Body("float64")
+    with pytest.raises(ValueError, match="framed is 31"):
+        body.inverse.set_terms(body.terms(30).native, framed=31)
+    with pytest.raises(ValueError, match="node -1"):
+        body.inverse.pull_back(np.full((1, 4), -1, dtype=np.int32), np.ones((1, 4, 3)), np.empty((1, 4, 3)))
+
+
 @pytest.mark.parametrize("simd", _native.simd_levels())
 def test_every_simd_level_gives_the_inverse(precision: str, simd: str) -> None:
     body = Body(precision, simd=simd)

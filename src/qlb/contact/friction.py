@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import BoolArray, FloatArray
+from qlb.arrays import BoolArray, FloatArray, LongArray
 from qlb.contact.model import ContactModel
 
 
@@ -21,6 +21,8 @@ class LaggedFriction:
         mu = model.friction[contacts.groups[:, 0], contacts.groups[:, 1]]
         self._slides = slides = np.flatnonzero(mu * contacts.force > 0)
         self._contacts, self._scale, self._mu = contacts, scale, mu[slides]
+        self.keys: LongArray = contacts.key[slides]
+        """of the pairs that slide"""
         self._plane = model.plane_of(contacts)[slides]
         on_plane = self._plane >= 0
         self._slip = np.zeros((len(slides), 3))

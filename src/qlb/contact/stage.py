@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray, IntArray
+from qlb.arrays import FloatArray, IntArray, LongArray
 from qlb.contact.friction import LaggedFriction
 from qlb.contact.model import ContactModel
 from qlb.contact.report import ContactForces
@@ -44,6 +44,10 @@ class ContactPoint:
     friction: _native.FrictionTerms | None = None
     sliding: FloatArray | None = None
     """the part of the gradient that is friction's, shape (n, 3)"""
+    sliding_keys: LongArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """pairs of primitives that friction is of, shape (f,)"""
+    secant: FloatArray | None = None
+    """by how much each friction has grown along the change of its slip since the point before, over that change (f,)"""
 
     def terms(self) -> Terms:
         """The Hessian along the normals, then that of friction, as a sum of k a a^T."""
@@ -56,13 +60,26 @@ class ContactPoint:
 
         Its stiffness is mu lambda f1(u)/u across the sliding u, and at least a part of that along it, where the Hessian
         has nothing once a contact slides: with all of it the quadratic would lie above its potential, with nothing a
-        step that turns u round goes too far.
+        step that turns u round goes too far. And at least what the last step has shown, where it turned u round.
         """
         f = self.friction
         assert f is not None
         stiffness = f.stiffness.copy()
         stiffness[::2] = np.maximum(f.stiffness[::2], ALONG * f.stiffness[1::2])
+        if self.secant is not None:
+            stiffness[::2] = np.maximum(stiffness[::2], np.minimum(self.secant, f.stiffness[1::2]))
         return f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], stiffness
+
+    def after(self, before: ContactPoint) -> ContactPoint:
+        """The same, with what the step from the point `before` tells of friction lagged at the same point."""
+        new, old = self.friction, before.friction
+        if new is None or old is None or not np.array_equal(self.sliding_keys, before.sliding_keys):
+            return self
+        step = new.slip - old.slip
+        change = new.stiffness[1::2, None] * new.slip - old.stiffness[1::2, None] * old.slip
+        length = np.sum(step**2, axis=1)
+        secant = np.divide(np.sum(change * step, axis=1), length, out=np.zeros_like(length), where=length > 0)
+        return replace(self, secant=secant)
 
     @property
     def count(self) -> int:
@@ -123,11 +140,12 @@ class StageContact:
             gradient = np.zeros_like(x)
             contacts = model.evaluate(x, self._offsets, self._scale, gradient)
             friction = None if self._friction is None else self._friction.whole
-            if friction is None:
+            if self._friction is None or friction is None:
                 return ContactPoint(contacts.energy, gradient, contacts)
             sliding = np.zeros_like(x)
             terms = self._slide(friction, x, sliding)
-            return ContactPoint(contacts.energy + terms.energy, gradient + sliding, contacts, terms, sliding)
+            keys = self._friction.keys
+            return ContactPoint(contacts.energy + terms.energy, gradient + sliding, contacts, terms, sliding, keys)
 
     def forces(self, x: FloatArray, point: ContactPoint) -> ContactForces:
         """Forces at positions `x` (n, 3) [m], where contact was found to be `point`."""

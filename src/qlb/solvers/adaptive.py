@@ -11,19 +11,21 @@ from qlb import _native
 from qlb.arrays import FloatArray
 from qlb.contact.stage import ContactPoint, Terms, joined
 from qlb.integrators.integrator import Stage, State
-from qlb.solvers.contact_base import ContactBase
-from qlb.solvers.factor import Factor
+from qlb.solvers.contact_base import SMALL, ContactBase
 from qlb.solvers.line_search import Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
 from qlb.solvers.settings import Projection, SolverSettings, Tolerance
-from qlb.solvers.work import cost_of_factor
+from qlb.solvers.work import cost_of_factor, cost_of_terms
 from qlb.system import StageProblem, System
 from qlb.timing import Timer
 
 MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
-CROWD = 600  # terms of contact from which on the factor takes them in
+CROWD = 600  # terms beside the factor from which on it takes them in
+COLUMN = 0.02  # cost of the half-solves of a node, in iterations
+RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
+OUTSIDE = 100  # terms that do not fit into its pattern, from which on it is extended for them
 
 
 class QLA(FactoredLbfgs):
@@ -33,14 +35,15 @@ class QLA(FactoredLbfgs):
     through since then. R keeps shear and inertia as they are; A takes what keeps volumes to what keeps volumes, since
     d det F = cof F : dF, and the closer to incompressible a material is, the more that matters.
 
-    With contact the factor holds inertia and elasticity alone, in double precision: next to stiff contacts single is
-    too little. All contacts enter by Woodbury's formula, with half-solves for their nodes that last as long as the
-    factor, and pairs hold the change of the gradient without contact, whose Hessian of the moment is known. Where there
-    are too many, a step makes a factor with all contacts of the moment in it, and goes on by differences.
+    With contact the factor holds the contacts of then, too, as far as they fit into its pattern, in which those with
+    planes and obstacles always do. By what the contacts of the moment differ enters by Woodbury's formula, with
+    half-solves for their nodes that last as long as the factor, and pairs hold the change of the gradient without
+    contact, whose Hessian of the moment is known.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
-    cost of a solve with this factor; within a solve, when the iterations that are still to come cost more. A cost is
-    counted in iterations, from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
+    cost of a solve with this factor, or when the terms beside it have cost some times a new one; within a solve, when
+    the iterations that are still to come cost more, or when these terms are too many. A cost is counted in iterations,
+    from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
     """
 
     name: ClassVar[str] = "QLA"
@@ -53,31 +56,31 @@ class QLA(FactoredLbfgs):
     }
 
     def __init__(self, system: System, settings: SolverSettings, tolerance: Tolerance) -> None:
-        if system.contact is not None and settings.precision in (None, "auto"):
-            settings = settings.model_copy(update={"precision": "float64"})
         super().__init__(system, settings, tolerance)
         self.system = system
-        kept = (self.factor.cholesky, system.blocks, system.held.fixed, system.threads)
-        self._low_rank = None if system.contact is None else _native.WoodburyInverse(*kept)
-        self._carried = self._low_rank or _native.CarriedInverse(*kept)
-        self.kappa = cost_of_factor(self.factor.cholesky, self.settings.precision, len(system.mesh.tets))
-        """Cost of assembly and factorisation, in iterations."""
+        self._low_rank: _native.WoodburyInverse | None = None
+        self._over_factor()
         self._stretch = stretch_weight(system.incompressibility)
         self._reference: FloatArray | None = None  # positions at which the factor was taken
         self._kind: tuple[float, bool] | None = None  # its c, and whether it holds inertia
+        self._base: ContactBase | None = None  # the contacts in it
         self._solves = self._spent = 0  # solves with this factor, and their iterations
+        self._has_column = np.zeros(system.nodes, dtype=bool)  # nodes with half-solves over this factor
+        self._beside = 0.0  # cost of the terms beside this factor, in iterations
         self._stale = False
-        self._crowded: Factor | None = None  # the factor with contact in it, for many contacts
-        self._base: ContactBase | None = None  # what it holds; None where it is not in use
 
-    @property
-    def factorizations(self) -> int:
-        """Factorisations tried so far."""
-        return self.factor.count + (0 if self._crowded is None else self._crowded.count)
-
-    def begin_step(self) -> None:
-        """Forget a factor that holds contact: each step makes its own."""
-        self._base = None
+    def _over_factor(self) -> None:
+        """See to what depends on the analysis of the factor."""
+        system, cholesky = self.system, self.factor.cholesky
+        self._analysed = cholesky
+        kept = (cholesky, system.blocks, system.held.fixed, system.threads)
+        if system.contact is None:
+            self._carried: _native.CarriedInverse | _native.WoodburyInverse = _native.CarriedInverse(*kept)
+        else:
+            self._carried = self._low_rank = _native.WoodburyInverse(*kept)
+        self._measures = (cholesky, self.settings.precision, len(system.mesh.tets))
+        self.kappa = cost_of_factor(*self._measures)
+        """Cost of assembly and factorisation, in iterations."""
 
     @property
     def inverse(self) -> _native.InverseOperator:
@@ -87,9 +90,7 @@ class QLA(FactoredLbfgs):
     @property
     def columns(self) -> int:
         """Nodes whose half-solves are kept for contact."""
-        if self._low_rank is None:
-            return 0
-        return self._low_rank.columns if self._base is None else self._crowded_inverse.columns
+        return 0 if self._low_rank is None else self._low_rank.columns
 
     def begin_solve(self, problem: StageProblem, point: Point, goal: float) -> None:
         """Start the account of a solve."""
@@ -105,90 +106,72 @@ class QLA(FactoredLbfgs):
         self._mark(point)
         if self.settings.carry_factor:
             with problem.timer.section("solve"):
+                if self._low_rank is not None:
+                    self._low_rank.set_terms(_no_terms())
                 self._carried.carry(point.x, self._reference, self._stretch)
 
     def direction(self, problem: StageProblem, point: Point) -> tuple[FloatArray, float]:
         """-H g, H from the pairs over the carried factor, which is made anew where contraction is too slow."""
-        slow = self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE
-        if self._low_rank is None or point.contact is None:
-            if slow:
-                self._refactor(problem, point, self.settings.projection)
+        contact = point.contact
+        touches = contact is not None and contact.count > 0  # then it is slow because contact is still being found
+        if not touches and self.settings.refactor_in_solve and self._needed(point) > self.kappa + PATIENCE:
+            self._refactor(problem, point, self.settings.projection)
+        if self._low_rank is None or contact is None:
             return super().direction(problem, point)
-        if slow:
-            self._renew(problem, point, point.contact, self.settings.projection)
         with problem.timer.section("contact"):
-            terms, known, inverse = self._terms(problem, point, point.contact)
-            rest, forces = _split(problem, point, point.contact, terms)
+            terms, known = self._terms(problem, point, contact)
+            rest, forces = _split(problem, point, contact, terms)
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
-            slope = self.history.direction_with(rest, inverse, terms, p, -forces, known)
+            slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces, known)
             self._p, self._known = p, _native.RankOneTerms(terms.nodes, terms.vectors, known)
             return p, slope
 
     def _terms(
         self, problem: StageProblem, point: Point, contact: ContactPoint
-    ) -> tuple[_native.RankOneTerms, FloatArray, _native.WoodburyInverse]:
-        """Terms of the Hessian of contact beside the factor, their stiffness in pairs, and the inverse with them.
+    ) -> tuple[_native.RankOneTerms, FloatArray]:
+        """Terms of the Hessian of contact beside the factor, and their stiffness in pairs.
 
-        Pairs hold the change of friction themselves, since its terms are a bound.
+        Pairs hold the change of friction themselves, since its terms are a bound. The factor is made anew where terms
+        are too many or their sum is not definite, and once more where double precision is still to be had; should that
+        not help, it has to do by itself.
+        """
+        given = problem.contact_terms(point.x, contact)
+        terms, done = self._beside_factor(problem, contact, given, most=self.kappa)
+        anew = not done
+        while anew:
+            self._refactor(problem, point, self.settings.projection)
+            terms, done = self._beside_factor(problem, contact, given)
+            anew = not done and self.factor.raise_precision()
+        if not done:
+            terms = _native.RankOneTerms(terms.nodes, terms.vectors, np.zeros(terms.size))
+            assert self._low_rank is not None
+            self._low_rank.set_terms(terms)
+        known = np.zeros(terms.size)
+        known[: len(given[2])] = given[2]
+        known[contact.count : len(contact.terms()[2])] = 0.0
+        return terms, known
+
+    def _beside_factor(
+        self, problem: StageProblem, contact: ContactPoint, given: Terms, most: float = inf
+    ) -> tuple[_native.RankOneTerms, bool]:
+        """Terms by which contact differs from what the factor holds; whether they are in place beside it.
+
+        They are not where they are too many, half-solves for their nodes cost more than `most` iterations, or the sum
+        is not definite.
         """
         assert self._low_rank is not None
-        given = problem.contact_terms(point.x, contact)
-        known = given[2].copy()
-        known[contact.count : len(contact.terms()[2])] = 0.0
-        if self._base is None and len(known) <= CROWD:
-            terms = _native.RankOneTerms(*given)
-            if self._low_rank.set_terms(terms):
-                return terms, known, self._low_rank
-        terms, removed = self._crowd_terms(problem, point, contact, given)
-        return terms, np.concatenate([known, np.zeros(removed)]), self._crowded_inverse
-
-    def _crowd_terms(
-        self, problem: StageProblem, point: Point, contact: ContactPoint, given: Terms
-    ) -> tuple[_native.RankOneTerms, int]:
-        """Terms beside the factor with contact, which is made anew where they are many or their sum is not definite.
-
-        Should that not help, the factor alone has to do.
-        """
-        if self._base is not None:
-            terms, removed = self._beside_base(problem, contact, given)
-            if np.count_nonzero(terms.stiffness) <= CROWD and self._crowded_inverse.set_terms(terms):
-                return terms, removed
-        self._take_in(problem, point, contact, self.settings.projection)
-        terms, removed = self._beside_base(problem, contact, given)
-        if not self._crowded_inverse.set_terms(terms):
-            terms = _native.RankOneTerms(terms.nodes, terms.vectors, np.zeros(terms.size))
-            self._crowded_inverse.set_terms(terms)
-        return terms, removed
-
-    def _beside_base(
-        self, problem: StageProblem, contact: ContactPoint, given: Terms
-    ) -> tuple[_native.RankOneTerms, int]:
-        """Terms by which contact differs from what the factor holds; how many are what it has too many."""
         assert self._base is not None
-        lacking, extra = self._base.difference(contact, given, problem.node_stiffness)
-        terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), extra))
-        return terms, len(extra[2])
-
-    def _take_in(self, problem: StageProblem, point: Point, contact: ContactPoint, projection: Projection) -> None:
-        """Factorise with all contacts of the moment."""
-        if self._crowded is None:
-            self._crowded = Factor(self.system, self.settings.cholesky, "float64")
-        if projection == "on-demand" and problem.system.is_inverted(point.x):
-            projection = "always"
-        self._crowded.update(problem, point.x, projection, contact.terms())
-        system = self.system
-        inverse = _native.WoodburyInverse(self._crowded.cholesky, system.blocks, system.held.fixed, system.threads)
-        self._crowded_inverse, self._base = inverse, ContactBase.of(contact)
-        self._mark(point)
-
-    def _renew(self, problem: StageProblem, point: Point, contact: ContactPoint, projection: Projection) -> None:
-        """A new factor here, of the kind in use."""
-        if self._base is None:
-            self._refactor(problem, point, projection)
-        else:
-            self.history.clear()
-            self._take_in(problem, point, contact, projection)
+        lacking, change = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
+        terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), change))
+        beside = np.flatnonzero(terms.stiffness)
+        nodes = np.unique(terms.nodes[beside])
+        new = COLUMN * np.count_nonzero(~self._has_column[nodes])
+        if len(beside) > CROWD or new > most:
+            return terms, False
+        self._has_column[nodes] = True
+        self._beside += new + cost_of_terms(len(beside), *self._measures)
+        return terms, self._low_rank.set_terms(terms, len(change[2]))
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
@@ -222,10 +205,15 @@ class QLA(FactoredLbfgs):
         return share * y + (1 - share) * Bs
 
     def end_solve(self) -> None:
-        """Decide whether the next solve needs a new factor: this one cost more than the mean with this factor."""
+        """Decide whether the next solve needs a new factor.
+
+        It does where this one cost more than the mean with this factor, or the terms beside it some times a new one.
+        """
         iterations = self._iterations - self._marked_at
         self._solves += 1
-        self._stale = iterations > (self.kappa + self._spent + iterations) / self._solves
+        self._stale = (
+            iterations > (self.kappa + self._spent + iterations) / self._solves or self._beside > RENT * self.kappa
+        )
         self._spent += iterations
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
@@ -235,61 +223,85 @@ class QLA(FactoredLbfgs):
         if self._rescues == MAX_RESCUES:
             return False
         self._rescues += 1
-        if point.contact is None:
-            self._refactor(problem, point, "always")
-        else:
-            self._renew(problem, point, point.contact, "always")
+        if point.contact is not None and point.contact.count:
+            self.factor.raise_precision()
+        self._refactor(problem, point, "always")
         return True
 
     def save(self) -> dict[str, FloatArray]:
-        """What the factor was made of, and the account of its use; for which pairs that with contact was analysed."""
-        crowded = {} if self._crowded is None else {f"crowded_{k}": v for k, v in self._crowded.save().items()}
+        """What the factor was made of, and the account of its use; for which pairs it was analysed."""
+        saved = super().save()
         if self._reference is None or self._kind is None:
-            return crowded
+            return saved
         factor = self.factor
         flags = (self._stale, factor.projected, factor.raised)
-        account = np.array([*self._kind, self._solves, self._spent, *flags], dtype=np.float64)
-        saved = crowded | {"reference": self._reference, "account": account}
+        account = np.array([*self._kind, self._solves, self._spent, self._beside, *flags], dtype=np.float64)
+        saved |= {"reference": self._reference, "account": account}
+        if self._base is not None:
+            saved |= self._base.save() | {"has_column": self._has_column.astype(np.float64)}
         if factor.shifted or not self.system.hessian_is_of_positions:
             saved["matrix"] = factor.matrix_values()  # many times larger; else it follows from the reference
         return saved
 
     def load(self, arrays: dict[str, FloatArray]) -> None:
         """Take it back, and factorise again."""
-        crowded = {k.removeprefix("crowded_"): v for k, v in arrays.items() if k.startswith("crowded_")}
-        self._crowded = self._base = None
-        if crowded:
-            self._crowded = Factor(self.system, self.settings.cholesky, "float64")
-            self._crowded.load(crowded)
+        super().load(arrays)
+        if self.factor.cholesky is not self._analysed:
+            self._over_factor()
+        self._base = None
         self._reference = arrays.get("reference")
         if self._reference is None:
             return
-        c, inertial, solves, spent, stale, projected, raised = arrays["account"]
+        c, inertial, solves, spent, self._beside, stale, projected, raised = (float(v) for v in arrays["account"])
         self._kind, self._solves, self._spent, self._stale = (c, bool(inertial)), int(solves), int(spent), bool(stale)
         values = arrays.get("matrix")
         if values is None:
             stage = Stage(0.0, c, ((1.0, self._reference),), np.zeros_like(self._reference), bool(inertial))
             then = StageProblem(self.system, stage, State(0.0, self._reference, stage.v_b), Timer())
             values = then.hessian(self._reference, project=bool(projected)).values
-        self.factor.restore(values, projected=bool(projected), raised=bool(raised))
+        if self._low_rank is not None:
+            self._base = ContactBase.load(arrays)
+            self._has_column = arrays["has_column"] != 0
         if self._low_rank is not None:
             self._low_rank.forget()
         self._carried.reset()
+        contact = None if self._base is None else self._base.held
+        self.factor.restore(values, projected=bool(projected), raised=bool(raised), contact=contact)
 
     def _refactor(self, problem: StageProblem, point: Point, projection: Projection) -> None:
+        """A factor of the Hessian here, with the contacts of the moment that fit into its pattern.
+
+        The pattern is extended where those that do not are many.
+        """
         self._reference = None  # until the new factor stands
         if projection == "on-demand" and (self._indefinite or problem.system.is_inverted(point.x)):
             projection = "always"
-        self.factor.update(problem, point.x, projection)
+        contact = None
+        if point.contact is not None:
+            contact = self._take_in(point.contact, problem.node_stiffness)
+        self.factor.update(problem, point.x, projection, contact)
         self._indefinite = self.factor.projected
+        if self.factor.cholesky is not self._analysed:
+            self._over_factor()
         if self._low_rank is not None:
             self._low_rank.forget()
         self._carried.reset()
         self.history.clear()
         self._reference, self._kind = point.x, _kind(problem)
         self._solves = self._spent = 0
+        self._beside = 0.0
+        self._has_column[:] = False
         self._stale = False
         self._mark(point)
+
+    def _take_in(self, contact: ContactPoint, scale: float) -> Terms:
+        """What of the contacts of the moment goes into the factor that is about to be made."""
+        nodes, _, stiffness = contact.terms()
+        fits = self.factor.fits(nodes)
+        if np.count_nonzero(stiffness[~fits] > SMALL * scale) > OUTSIDE:
+            fits[:] = True
+        self._base = ContactBase.of(contact, fits)
+        return self._base.held
 
     def _mark(self, point: Point) -> None:
         """Measure contraction from here on."""
@@ -320,6 +332,10 @@ def _secant_gradient(point: Point) -> FloatArray:
     if point.contact is None or point.contact.sliding is None:
         return point.smooth
     return point.smooth + point.contact.sliding
+
+
+def _no_terms() -> _native.RankOneTerms:
+    return _native.RankOneTerms(np.empty((0, 4), dtype=np.int32), np.empty((0, 4, 3)), np.empty(0))
 
 
 def stretch_weight(incompressibility: float) -> float:

@@ -78,6 +78,10 @@ class ContactMatrix:
         found = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
         return np.asarray((self._keys[found] == wanted).all(axis=1))
 
+    def fits(self, nodes: IntArray) -> BoolArray:
+        """Which of the stencils (k, 4) need no extension."""
+        return self._holds(self._onto_free(nodes, np.zeros((len(nodes), 12, 12)))[0])
+
     @property
     def stencils(self) -> IntArray:
         """Contacts that the pattern is extended for, shape (k, 4)."""

@@ -145,10 +145,11 @@ class Descent(ABC):
             if isinstance(found, Reason):
                 log.add(old, 0.0)
                 return found
-            self.accept(problem, old, found.point, limited=found.longest < 1)
-            log.add(found.point, found.step_length, found.longest)
-            reason = _converged(found.point, *goals)
-            if reason is None and found.small and _is_settled(problem, found.point, reference):
+            new = found.point.after(old)
+            self.accept(problem, old, new, limited=found.longest < 1)
+            log.add(new, found.step_length, found.longest)
+            reason = _converged(new, *goals)
+            if reason is None and found.small and _is_settled(problem, new, reference):
                 reason = Reason.CONVERGED_STEP
         return reason
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray
+from qlb.arrays import BoolArray, FloatArray, IntArray
 from qlb.contact.stage import ContactPoint, Terms
 from qlb.errors import InputError
 from qlb.solvers.contact_matrix import ContactMatrix
@@ -55,10 +55,8 @@ class Factor:
         if self._try(problem, x, projection, contact):
             return
         scale = float(np.abs(self._matrix.values).max())
-        if np.isfinite(scale) and self._precision == "auto" and not self.raised:
-            self._raise_precision()
-            if self._try(problem, x, projection, contact):
-                return
+        if np.isfinite(scale) and self.raise_precision() and self._try(problem, x, projection, contact):
+            return
         self.shifted = True
         for shift in _shifts(scale):
             self._matrix.shift_diagonal(shift)
@@ -77,10 +75,14 @@ class Factor:
                 return True
         return False
 
-    def _raise_precision(self) -> None:
+    def raise_precision(self) -> bool:
+        """Go over to float64 from the next factor on, where precision "auto" has not yet; whether it did."""
+        if self._precision != "auto" or self.raised:
+            return False
         assert isinstance(self.cholesky, _native.SupernodalCholesky)
         self.cholesky.set_precision("float64")
         self.raised = True
+        return True
 
     def _factorise(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | Terms | None) -> bool:
         matrix = self._matrix
@@ -113,19 +115,27 @@ class Factor:
             self._contact_matrix().analyse(arrays["stencils"].astype(np.int32))
             self.cholesky = self._contact_matrix().cholesky
 
+    def fits(self, nodes: IntArray) -> BoolArray:
+        """Which contacts with these nodes (k, 4) fit into the pattern as it is."""
+        return self._contact_matrix().fits(nodes)
+
     def matrix_values(self) -> FloatArray:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""
         return self._matrix.values.copy()
 
-    def restore(self, values: FloatArray, *, projected: bool, raised: bool) -> None:
-        """Factorise what `matrix_values` gave, in the precision of then, without counting it."""
-        if raised and not self.raised:
-            self._raise_precision()
+    def restore(self, values: FloatArray, *, projected: bool, raised: bool, contact: Terms | None = None) -> None:
+        """Factorise what `matrix_values` gave and `contact`, in the precision of then, without counting it."""
+        if raised:
+            self.raise_precision()
         if values.shape != self._matrix.values.shape:
             raise InputError(f"blocks have shape {values.shape}, must be {self._matrix.values.shape}")
         self._matrix.values[...] = values
         self.projected = projected
-        self.cholesky.factorise(self._matrix)
+        matrix = self._matrix
+        if contact is not None:
+            matrix = self._contact_matrix().assemble(matrix, contact, np.empty(0))
+            self.cholesky = self._contact_matrix().cholesky
+        self.cholesky.factorise(matrix)
 
     def solve(self, problem: StageProblem, b: FloatArray) -> FloatArray:
         """B^-1 b, shape (n, 3), zero at held degrees of freedom."""

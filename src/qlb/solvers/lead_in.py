@@ -45,16 +45,22 @@ class LeadIn:
         return self._fraction == 1.0
 
     def advance(self) -> FloatArray | None:
-        """Positions (n, 3) [m] to solve from, as far along the way as is free; None where the script is blocked."""
+        """Positions (n, 3) [m] to solve from, as far along the way as is free; None where the script is blocked.
+
+        Of two ways that are free to their ends, the one that ends lower: bodies that follow what moves them are better
+        taken along, and those that it runs into left where they are.
+        """
         if self._is_stuck():
             return None
         self._contact.set_fraction(self._fraction)
         x, moves = self._x, self._moves()
-        parts = [self._contact.bound(x, moves[0], moving_planes=True)]
-        if parts[0] < 1 and len(moves) > 1:
-            parts.append(self._contact.bound(x, moves[1], moving_planes=True))
+        parts = [self._contact.bound(x, move, moving_planes=True) for move in moves]
         self._limit = self._contact.limiting() or self._limit
         best = int(np.argmax(parts))
+        if len(moves) > 1 and min(parts) == 1:
+            self._contact.set_fraction(1.0)
+            energies = np.array([self._problem.evaluate(x + move).energy for move in moves])
+            best = int(np.argmin(np.where(np.isnan(energies), np.inf, energies)))
         t, p = parts[best], moves[best]
         if t < 1:
             t *= SHARE
@@ -92,7 +98,7 @@ class LeadIn:
         return len(history) > PATIENCE and history[-1] - history[-1 - PATIENCE] < LEAST_PROGRESS
 
     def _moves(self) -> list[FloatArray]:
-        """Ways to try, the best first: from where we are to where all that is scripted has arrived."""
+        """Ways to try: from where we are to where all that is scripted has arrived."""
         problem, x = self._problem, self._x
         still = problem.system.held.place(x, problem.stage.time) - x
         if self._move is not None:
@@ -102,9 +108,9 @@ class LeadIn:
         else:
             return [still]
         moving = problem.system.held.place(guess, problem.stage.time) - x
-        if self._fraction == 0 and self._touches():
-            return [still, moving] if self._scripted else [still]
-        return [moving, still] if self._scripted else [moving]
+        if self._scripted:
+            return [moving, still]
+        return [still] if self._fraction == 0 and self._touches() else [moving]
 
     def _touches(self) -> bool:
         return self._contact.at(self._x).count > 0

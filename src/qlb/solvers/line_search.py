@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from qlb.arrays import FloatArray
@@ -30,6 +30,12 @@ class Point:
     def is_finite(self) -> bool:
         """Whether the energy and every entry of the gradient are numbers."""
         return isfinite(self.energy) and isfinite(self.residual)
+
+    def after(self, before: Point) -> Point:
+        """The same, with what contact learns from the step from the point `before`."""
+        if self.contact is None or before.contact is None:
+            return self
+        return replace(self, contact=self.contact.after(before.contact))
 
     @staticmethod
     def at(problem: StageProblem, x: FloatArray) -> Point:

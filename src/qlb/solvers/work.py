@@ -11,6 +11,8 @@ PER_SOLVE_ENTRY = {"float32": 0.7, "float64": 1.2}
 PER_HESSIAN_TET = 110.0
 PER_GRADIENT_TET = 25.0
 PER_ITERATION = 1e5
+PER_TERM = 1.5e4
+PER_TERM_CUBED = 0.035
 
 
 def cost_of_factor(cholesky: _native.Cholesky, precision: str, tets: int) -> float:
@@ -18,7 +20,20 @@ def cost_of_factor(cholesky: _native.Cholesky, precision: str, tets: int) -> flo
 
     `precision` is that of the factor; "auto" counts as the float32 that it starts with.
     """
-    kind = "float64" if precision == "float64" else "float32"
+    kind = _kind(precision)
     entries = cholesky.factor_nonzeros
     factor = PER_FLOP[kind] * cholesky.factor_flops + PER_FACTOR_ENTRY[kind] * entries + PER_HESSIAN_TET * tets
-    return factor / (PER_SOLVE_ENTRY[kind] * entries + PER_GRADIENT_TET * tets + PER_ITERATION)
+    return factor / _iteration(cholesky, kind, tets)
+
+
+def cost_of_terms(terms: int, cholesky: _native.Cholesky, precision: str, tets: int) -> float:
+    """What rank-one terms beside a factor add to an iteration over it, in such iterations."""
+    return (PER_TERM * terms + PER_TERM_CUBED * terms**3) / _iteration(cholesky, _kind(precision), tets)
+
+
+def _iteration(cholesky: _native.Cholesky, kind: str, tets: int) -> float:
+    return PER_SOLVE_ENTRY[kind] * cholesky.factor_nonzeros + PER_GRADIENT_TET * tets + PER_ITERATION
+
+
+def _kind(precision: str) -> str:
+    return "float64" if precision == "float64" else "float32"

@@ -1,0 +1,124 @@
+"""Contacts in QLA's factor: with the difference they make up the Hessian of now, by dense sums; they outlast steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from qlb import Contact, Plane, Simulation
+from qlb.contact.stage import ContactPoint, StageContact, Terms
+from qlb.integrators.integrator import Origin, Stage
+from qlb.solvers import QLA
+from qlb.solvers.contact_base import ContactBase
+from qlb.timing import Timer
+from tests.contact.scenes import SOFT, UP, block, simulate
+from tests.support import Array
+
+DHAT = 4e-3
+STEP = 1e-2
+
+
+def resting() -> Simulation:
+    """A block with its underside half of dhat above a plane with friction."""
+    contact = Contact(dhat=DHAT, friction=0.3)
+    return simulate(block(material=SOFT), Plane((0, -0.05 - DHAT / 2, 0), UP), solver="QLA", contact=contact)
+
+
+def dense(terms: Terms, count: int) -> Array:
+    nodes, vectors, stiffness = terms
+    columns = np.zeros((len(nodes), count, 3))
+    for slot in range(4):
+        columns[np.arange(len(nodes)), nodes[:, slot]] += vectors[:, slot]
+    columns = columns.reshape(len(nodes), -1).T
+    return (columns * stiffness) @ columns.T
+
+
+def at(simulation: Simulation, x: Array, slid_from: Array) -> ContactPoint:
+    """Contact at `x`, with friction lagged there, after a slip from `slid_from`."""
+    model = simulation.system.contact
+    assert model is not None
+    model.stale = True
+    stage = Stage(STEP, STEP, ((1.0, slid_from),), np.zeros_like(x))
+    return StageContact(model, stage, STEP**2, Origin(x, STEP), Timer()).at(x)
+
+
+def moved(simulation: Simulation, rng: np.random.Generator) -> tuple[ContactPoint, ContactPoint, Array]:
+    """Contact now and then: stiffer here, softer there, gone at some nodes, with friction turned."""
+    x = simulation.state.positions
+    after = x + np.array([1e-5, 0, 0]) + rng.uniform(-0.4 * DHAT, 0.6 * DHAT, size=(len(x), 1)) * np.array(UP)
+    return at(simulation, after, x), at(simulation, x, x + rng.uniform(-1e-5, 1e-5, size=x.shape)), x
+
+
+@pytest.mark.parametrize("held", [1.0, 0.5])
+def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(held, monkeypatch, rng):
+    monkeypatch.setattr("qlb.solvers.contact_base.SAME", 1.0)
+    monkeypatch.setattr("qlb.solvers.contact_base.SMALL", 0.0)
+    simulation = resting()
+    now, then, x = moved(simulation, rng)
+    assert 0 < now.count < then.count
+    terms = then.terms()
+    base = ContactBase.of(then, rng.random(len(terms[2])) < held)
+    lacking, change = base.difference(now, now.terms(), simulation.solver.inverse, 1.0)
+    found = dense(base.held, len(x)) + dense((*now.terms()[:2], lacking), len(x)) + dense(change, len(x))
+    wanted = dense(now.terms(), len(x))
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_by_default_the_model_is_near_enough_along_every_direction(rng):
+    simulation = resting()
+    now, then, x = moved(simulation, rng)
+    scale = 0.05 * then.terms()[2].max()
+    base = ContactBase.of(then, np.ones(len(then.terms()[2]), dtype=bool))
+    lacking, change = base.difference(now, now.terms(), simulation.solver.inverse, scale)
+    own = scale * np.eye(3 * len(x))  # stands for the bodies
+    found = dense(base.held, len(x)) + dense((*now.terms()[:2], lacking), len(x)) + dense(change, len(x))
+    model, wanted = own + found, own + dense(now.terms(), len(x))
+    factor = np.linalg.inv(np.linalg.cholesky(model))
+    spread = np.linalg.eigvalsh(factor @ wanted @ factor.T)
+    assert spread.min() > 0.45
+    assert spread.max() < 2.2
+    assert len(change[2]) + np.count_nonzero(lacking) < len(then.terms()[2])
+
+
+def test_a_saved_base_comes_back(rng):
+    _, then, _ = moved(resting(), rng)
+    base = ContactBase.of(then, np.ones(len(then.terms()[2]), dtype=bool))
+    again = ContactBase.load(base.save())
+    np.testing.assert_array_equal(again.keys, base.keys)
+    np.testing.assert_array_equal(again.sliding, base.sliding)
+    for part, expected in zip(again.terms, base.terms, strict=True):
+        np.testing.assert_array_equal(part, expected)
+
+
+def test_friction_that_a_step_has_turned_round_holds_along_its_slip():
+    simulation = resting()
+    x, slip = simulation.state.positions, np.array([1e-3, 0, 0])
+    model = simulation.system.contact
+    assert model is not None
+    stage = Stage(STEP, STEP, ((1.0, x),), np.zeros_like(x))
+    contact = StageContact(model, stage, STEP**2, Origin(x, STEP), Timer())
+    before, turned, further = (contact.at(x + part * slip) for part in (1, -1, 2))
+    across = turned.sliding_terms()[2][1::2]
+    assert (turned.sliding_terms()[2][::2] < 0.3 * across).all()
+    np.testing.assert_allclose(turned.after(before).sliding_terms()[2][::2], across)
+    for point in (further.after(before), turned.after(replace(before, friction=None))):
+        assert (point.sliding_terms()[2][::2] < 0.3 * point.sliding_terms()[2][1::2]).all()
+
+
+def test_contacts_that_last_stay_in_the_factor():
+    """A block pressed by a plane: a factor that holds them serves for many steps, with few terms beside it."""
+    plane = Plane((0, -0.05 - DHAT, 0), UP, motion=lambda x, time: x + np.array([0, 0.02 * time, 0]))
+    body = block(material=SOFT, cells=(6, 3, 6))
+    contact = Contact(dhat=DHAT)
+    top = Plane((0, 0.05 + DHAT / 2, 0), (0.0, -1.0, 0.0))
+    simulation = simulate(body, plane, top, solver="QLA", contact=contact, gravity=(0.0, 0.0, 0.0))
+    results = list(simulation.run(40))
+    assert all(result.converged for result in results)
+    late = [solve for result in results[15:] for solve in result.solves]
+    assert all(solve.rows[-1].contacts > 90 for solve in late)
+    assert sum(solve.factorizations for solve in late) <= 0.4 * len(late)
+    solver = simulation.solver
+    assert isinstance(solver, QLA)
+    assert np.mean([solve.rows[-1].columns for solve in late]) < 30
