@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
@@ -11,34 +10,13 @@ from qlb.errors import InputError
 from qlb.scenes.document import Document, read_document
 from qlb.scenes.overrides import override
 from qlb.scenes.scene import FORMAT_VERSION, Scene
+from qlb.scenes.source import Source
 from qlb.scenes.toml_document import parse_toml
 from qlb.scenes.yaml_document import parse_yaml
 from qlb.setting_keys import ENTRY, SettingError, key_fields, unknown_key
 
 PARSERS = {".yaml": parse_yaml, ".toml": parse_toml}
 """By the ending of a file; the first reads all others."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a scene comes from.
-
-    Attributes:
-        document: its file, or None for a built-in scene.
-        changed: keys that KEY=VALUE pairs have set since.
-    """
-
-    document: Document | None
-    changed: tuple[str, ...] = ()
-
-    def located(self, error: InputError) -> InputError:
-        """`error` with the place in the file that it is about in front."""
-        if self.document is None:
-            return error
-        key = error.key if isinstance(error, SettingError) else ""
-        if any(f"{key}.".startswith(f"{changed}.") for changed in self.changed):
-            return error
-        return SettingError(key, f"{self.document.at(self.document.place(key))}: {error}")
 
 
 def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:

@@ -25,7 +25,7 @@ from qlb.solvers import SOLVERS, SolverSettings, Tolerance
 from qlb.system.system import MassKind
 
 if TYPE_CHECKING:
-    from qlb.scenes.files import Source
+    from qlb.scenes.source import Source
 
 FORMAT_VERSION = 1
 """Of scene files."""
