@@ -21,6 +21,8 @@ from qlb.results.run import Frame, Run
 
 COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.22, 1.0, 256)), name="displacement")
 """viridis without its darkest end, in which edges and shading would not show."""
+OUTLINED = 3.0
+"""Sharp edges longer than this, in units of the root of the surface's area, tell a shape: a cube has 4.9."""
 _REST = "#9aa5b1"
 _MOST_NAMES = 8
 _EDGES_BELOW = 20_000
@@ -60,10 +62,10 @@ class ShownBodies:
         return np.asarray(np.linalg.norm(x - self.rest, axis=1))
 
     def add_rest(self, plotter: Any, pyvista: ModuleType) -> None:
-        """Show the shape at rest faintly: its sharp edges, or all of it where it has none."""
+        """Show the shape at rest faintly: its sharp edges, or all of it where they are but a few scattered ones."""
         rest = pyvista.PolyData.from_regular_faces(self.rest, self.surface.triangles)
-        outline = rest.extract_feature_edges(40, boundary_edges=False, manifold_edges=False)
-        if outline.n_points:
+        outline = rest.extract_feature_edges(60, boundary_edges=False, manifold_edges=False)
+        if outline.n_points and outline.compute_cell_sizes()["Length"].sum() > OUTLINED * np.sqrt(rest.area):
             plotter.add_mesh(outline, color=_REST, line_width=OVERSAMPLING, lighting=False)
         else:
             plotter.add_mesh(rest, color=_REST, opacity=0.15, lighting=False)
