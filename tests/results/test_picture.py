@@ -11,6 +11,7 @@ from PIL import Image
 import qlb
 from qlb.mesh.closest import embed
 from qlb.results import MissingExtra, RenderingFailed, Run, RunWriter, picture, render_frames, rendering
+from qlb.results.shown import ShownBodies
 
 
 @pytest.mark.usefixtures("can_render")
@@ -88,9 +89,9 @@ def test_what_is_drawn_is_the_embedded_surface(tmp_path):
     with RunWriter(tmp_path / "run", {"scene": "mine"}, simulation) as writer:
         writer.record(simulation.advance())
     run = Run(tmp_path / "run")
-    drawn = picture._Surface.of(run, [run.frame(0), run.frame(1)])
-    np.testing.assert_array_equal(drawn.triangles, [[0, 1, 2]])
+    drawn = ShownBodies.of(run)
+    np.testing.assert_array_equal(drawn.surface.triangles, [[0, 1, 2]])
     np.testing.assert_allclose(drawn.rest, corners, atol=1e-12)
-    np.testing.assert_allclose(drawn.deformed[0], corners, atol=1e-12)
+    np.testing.assert_allclose(drawn.at(run.frame(0)), corners, atol=1e-12)
     fallen = run.frame(1).positions - run.frame(0).positions
-    assert drawn.largest == pytest.approx(-fallen[:, 1].mean(), rel=1e-6)  # it falls as a whole
+    np.testing.assert_allclose(drawn.displacement(drawn.at(run.frame(1))), -fallen[:, 1].mean(), rtol=1e-6)

@@ -145,7 +145,7 @@ def test_a_case_that_fails_is_a_row_that_says_so(tmp_path: Path, monkeypatch: py
         if step == "-1":
             assert (row["status"], row["error"]) == ("refused", "step: -1 is out of range: must be > 0 s")
         elif path != "null":
-            assert (row["status"], row["error"]) == ("refused", f"mesh file {missing} does not exist")
+            assert (row["status"], row["error"]) == ("refused", f"mesh: mesh file {missing} does not exist")
         elif iterations == "1":
             assert (row["status"], row["failed_steps"], row["converged"]) == ("failed", 1, "false")
             assert "step 1 " in row["error"]

@@ -83,8 +83,8 @@ class MeshFile:
         if bad.any():
             first = int(np.argmax(bad))
             raise InputError(
-                f"mesh file {self.path}: node {used[first]} has position {positions[first].tolist()}, must be below"
-                f" {LARGEST:g} m"
+                f"mesh file {self.path}: node {used[first]} has position {positions[first].tolist()}, must be finite"
+                f" and below {LARGEST:g} m"
             )
         return positions, renumbered.reshape(cells.shape).astype(np.int32)
 
