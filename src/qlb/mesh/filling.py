@@ -22,17 +22,13 @@ from qlb.mesh.closest import embed
 from qlb.mesh.embedded_surface import EmbeddedSurface
 from qlb.mesh.files import MeshFile, read_surface
 from qlb.mesh.geometry import tet_components
-from qlb.mesh.surface import SurfaceReport, diagonal, merge_coincident, repair, thinned
+from qlb.mesh.surface import SurfaceReport, diagonal, merge_coincident, repair
 from qlb.mesh.tet_mesh import TetMesh
 
 FEWEST, MOST, DEFAULT = 100, 2_000_000, 5000
 CLOSE, ALLOWED = 0.12, 0.25
 """The search ends at a number of tets that is missed by less than the first share; one missed by more than the second
 is said aloud."""
-THINNING = 0.1
-"""Side of the cells in edges, within which vertices become one before fTetWild, whose time goes with their number.
-
-What is thinner than that would vanish in the envelope."""
 RUNS = 5
 FIRST_SHARE, FIRST_POWER = 0.09, 1.6
 """The edge, in diagonals, that makes `DEFAULT` tets, and the power of 1 / edge that their number goes with: a first
@@ -157,8 +153,8 @@ class _Task:
     def run(self, share: float) -> TetMesh:
         """Tets of a target edge that is a share of the diagonal."""
         centre = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
-        vertices, triangles = thinned(self.vertices, self.triangles, THINNING * share * self.size)
-        arrays = {"vertices": (vertices - centre) / self.size, "triangles": triangles}
+        vertices = (self.vertices - centre) / self.size
+        arrays = {"vertices": vertices, "triangles": in_space(vertices, self.triangles)}
         with tempfile.TemporaryDirectory(prefix="qlb-") as folder:
             request = {"task": "fill", "edge": share, "epsilon": ENVELOPE * share, "folder": folder}
             try:
@@ -188,6 +184,18 @@ class _Task:
                 break
         _, _, mesh, share = min(tried, key=lambda t: t[0])
         return share, mesh
+
+
+def in_space(vertices: FloatArray, triangles: IntArray) -> IntArray:
+    """The triangles in the order of a balanced tree in space.
+
+    fTetWild searches them in a tree that halves their order. Where neighbours in that are far apart in space, its boxes
+    overlap so much that a surface of 70 000 triangles takes hours.
+    """
+    from scipy.spatial import cKDTree
+
+    order = cKDTree(vertices[triangles].mean(axis=1), leafsize=1).indices
+    return np.ascontiguousarray(triangles[order])
 
 
 def given_surface(source: str | Path | tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[str, FloatArray, IntArray]:

@@ -94,20 +94,6 @@ def merge_coincident(vertices: FloatArray, triangles: npt.NDArray[np.integer]) -
     return vertices[first[order]], rank[renumbered][triangles].astype(np.int32)
 
 
-def thinned(vertices: FloatArray, triangles: IntArray, cell: float) -> tuple[FloatArray, IntArray]:
-    """A coarser surface, on the means of the vertices in each cell [m] of a grid, for what need not see its details.
-
-    J. Rossignac, P. Borrel (1993), "Multi-resolution 3D approximations for rendering complex scenes".
-    """
-    cells = np.floor((vertices - vertices.min(axis=0)) / cell)
-    _, of_vertex, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    of_vertex = of_vertex.reshape(-1)
-    sums = [np.bincount(of_vertex, weights=vertices[:, k]) for k in range(3)]
-    means = np.stack(sums, axis=1) / count[:, None]
-    kept = of_vertex[triangles].astype(np.int32)
-    return means, kept[sound_triangles(means, kept)]
-
-
 def _coincident(vertices: FloatArray, tolerance: float) -> IntArray:
     """A label of each vertex, which those within `tolerance` [m] of each other share, shape (q,)."""
     # Two that are so near share a cell in one of eight grids, shifted by half a cell along each axis. Pairs of near

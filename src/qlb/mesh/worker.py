@@ -82,7 +82,6 @@ def fill(header: dict[str, Any], arrays: Arrays) -> tuple[dict[str, Any], Arrays
         arrays["triangles"],
         edge_length_abs=header["edge"],
         epsilon=header["epsilon"],
-        num_threads=1,
         vtk_ordering=True,  # which turns its tets to positive orientation
     )
     return {}, {"positions": positions, "tets": tets}
