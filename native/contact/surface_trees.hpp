@@ -89,7 +89,8 @@ class OrderedCollector {
 // is b, only pairs (i, j) with i < j.
 template <std::size_t A, std::size_t B>
 void find_near(const TreePair<A, B>& trees, std::int32_t leaf, std::vector<Pair>& places) {
-  const auto& [a, b] = trees;
+  const PrimitiveTree<A>* a = trees.a;
+  const PrimitiveTree<B>* b = trees.b;
   const bool same = static_cast<const void*>(a) == static_cast<const void*>(b);
   constexpr int kKinds = static_cast<int>(A + B == 4 ? A - 1 : 2);
   const PairKernels& kernels = pair_kernels();

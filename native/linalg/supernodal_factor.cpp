@@ -150,6 +150,7 @@ void SupernodalFactor<T>::assemble(std::int32_t s, const double* values, bool sh
 // What the children leave for the panel, or for the update matrix.
 template <class T>
 void SupernodalFactor<T>::add_children(std::int32_t s, int thread, bool shared, bool into_panel) {
+  if (!into_panel && supernodes_.rows_below(s) == 0) return;  // there is no update matrix
   const std::int64_t columns = supernodes_.columns(s), ld = into_panel ? supernodes_.front(s) : update_ld(s);
   T* front = into_panel ? panel(s) : update(s, thread) - columns * (ld + 1);
   for (const std::int32_t c : supernodes_.children(s)) {
