@@ -42,6 +42,9 @@ void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
           "set_precision",
           [](SupernodalCholesky& f, const std::string& precision) { f.set_precision(precision_named(precision)); },
           nb::arg("precision"), "Go on in another precision; the factor in place is lost.")
+      .def_prop_ro(
+          "precision",
+          [](const SupernodalCholesky& f) { return f.precision() == Precision::float32 ? "float32" : "float64"; })
       .def(
           "forward_sparse",
           [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {

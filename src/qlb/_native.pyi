@@ -369,6 +369,9 @@ class SupernodalCholesky(Cholesky):
     def set_precision(self, precision: str) -> None:
         """Go on in another precision; the factor in place is lost."""
 
+    @property
+    def precision(self) -> str: ...
+
     def forward_sparse(self, dofs: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.int64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]:
         """
         (rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.
@@ -476,6 +479,11 @@ class WoodburyInverse(InverseOperator):
     @property
     def bytes(self) -> int:
         """Memory of the half-solves and their products."""
+
+def contact_change(now: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], held: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
+    """
+    What a model needs beside a factor that holds other contacts. now, held: pairs of primitives, of contacts (k) and of friction (f), then the terms' nodes (t, 4), vectors (t, 4, 3) and stiffness (t): k along normals, 2 f of friction, any others; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
+    """
 
 def simd_levels() -> list[str]:
     """SIMD levels this build and this machine can run, the one in use last"""

@@ -9,7 +9,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, Terms, joined
+from qlb.contact.stage import ContactPoint, Terms
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.contact_base import SMALL, ContactBase
 from qlb.solvers.line_search import Point
@@ -149,7 +149,7 @@ class QLA(FactoredLbfgs):
             self._low_rank.set_terms(terms)
         known = np.zeros(terms.size)
         known[: len(given[2])] = given[2]
-        known[contact.count : len(contact.terms()[2])] = 0.0
+        known[contact.count : contact.count + 2 * len(contact.sliding_keys)] = 0.0
         return terms, known
 
     def _beside_factor(
@@ -162,8 +162,7 @@ class QLA(FactoredLbfgs):
         """
         assert self._low_rank is not None
         assert self._base is not None
-        lacking, change = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
-        terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), change))
+        terms, framed = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
         beside = np.flatnonzero(terms.stiffness)
         nodes = np.unique(terms.nodes[beside])
         new = COLUMN * np.count_nonzero(~self._has_column[nodes])
@@ -171,7 +170,7 @@ class QLA(FactoredLbfgs):
             return terms, False
         self._has_column[nodes] = True
         self._beside += new + cost_of_terms(len(beside), *self._measures)
-        return terms, self._low_rank.set_terms(terms, len(change[2]))
+        return terms, self._low_rank.set_terms(terms, framed)
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
