@@ -1,3 +1,4 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
@@ -58,12 +59,16 @@ void bind_terms(nb::module_& m) {
           nb::arg("beta"), nb::arg("out").noconvert(), ReleaseGil(), "out += C beta, shapes (k,) and (n, 3).")
       .def(
           "add_product",
-          [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale) {
+          [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale,
+             const std::optional<Array<const double>>& stiffness) {
             terms.check_nodes(static_cast<std::int64_t>(v.size()) / 3);
-            terms.add_product(v.data(), sized(out, static_cast<std::int64_t>(v.size()), "out"), scale);
+            const auto size = static_cast<std::int64_t>(v.size());
+            const auto count = static_cast<std::size_t>(terms.size());
+            const double* k = stiffness ? sized(*stiffness, terms.size(), "stiffness") : terms.all_stiffness().data();
+            terms.add_product(v.data(), sized(out, size, "out"), scale, {k, count});
           },
-          nb::arg("v"), nb::arg("out").noconvert(), nb::arg("scale") = 1.0, ReleaseGil(),
-          "out += scale C K C^T v, both of shape (n, 3).");
+          nb::arg("v"), nb::arg("out").noconvert(), nb::arg("scale") = 1.0, nb::arg("stiffness") = nb::none(),
+          ReleaseGil(), "out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).");
 }
 
 // keys, sliding, nodes, vectors, stiffness

@@ -172,6 +172,11 @@ class FrictionTerms:
     @property
     def slip(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
 
+    def secant(self, before: FrictionTerms) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        By how much each friction has grown along the change of its slip since `before`, over that change (k,); 0 where that is none.
+        """
+
 class Friction:
     """Smooth Coulomb friction with lagged normal forces."""
 
@@ -432,8 +437,10 @@ class RankOneTerms:
     def add_combination(self, beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """out += C beta, shapes (k,) and (n, 3)."""
 
-    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0) -> None:
-        """out += scale C K C^T v, both of shape (n, 3)."""
+    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0, stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).
+        """
 
 class WoodburyInverse(InverseOperator):
     """

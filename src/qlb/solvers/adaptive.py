@@ -124,7 +124,7 @@ class QLA(FactoredLbfgs):
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
             slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces, known)
-            self._p, self._known = p, _native.RankOneTerms(terms.nodes, terms.vectors, known)
+            self._p, self._terms_there, self._known = p, terms, known
             return p, slope
 
     def _terms(
@@ -195,7 +195,7 @@ class QLA(FactoredLbfgs):
         """
         system = problem.system
         Bs = -system.norm(s) / system.norm(self._p) * old.gradient
-        self._known.add_product(s, Bs, -1.0)
+        self._terms_there.add_product(s, Bs, -1.0, self._known)
         system.clear_held(Bs)
         sBs, sy = system.dot(s, Bs), system.dot(s, y)
         if sy >= DAMPING * sBs:
