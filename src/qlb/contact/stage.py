@@ -94,6 +94,7 @@ class StageContact:
         self.model, self._stage, self._scale, self._timer = model, stage, scale, timer
         self._from, self._to = model.offsets(origin.time), model.offsets(stage.time)
         self._offsets = self._from
+        self._still = np.zeros_like(origin.positions)
         self._friction: LaggedFriction | None = None
         self._at_plane: tuple[int, int] | None = None  # node and plane that bounded the last step
         self.friction_pass = 1
@@ -163,7 +164,7 @@ class StageContact:
     def cover(self, x: FloatArray, p: FloatArray | None) -> None:
         """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""
         candidates, dhat = self.model.candidates, self.model.dhat
-        p = np.zeros_like(x) if p is None else p
+        p = self._still if p is None else p
         with self._timer.section("candidates"):
             if self.model.stale or not candidates.covers(x, p):
                 candidates.build(x, p, MARGIN * dhat, dhat)
@@ -202,7 +203,7 @@ class StageContact:
         gaps = model.plane_gaps(x, self._offsets)
         if gaps.size == 0:
             return 1.0
-        closing = -(p[model.vertices] @ model.normals.T)
+        closing = -(p @ model.normals.T)[model.vertices]
         if moving_planes:
             closing = closing + (self._to - self._offsets)
         most = PLANE_SHARE * gaps

@@ -66,6 +66,7 @@ class QLA(FactoredLbfgs):
         self._base: ContactBase | None = None  # the contacts in it
         self._solves = self._spent = 0  # solves with this factor, and their iterations
         self._has_column = np.zeros(system.nodes, dtype=bool)  # nodes with half-solves over this factor
+        self._zeros = np.zeros((system.nodes, 3))
         self._beside = 0.0  # cost of the terms beside this factor, in iterations
         self._stale = False
 
@@ -164,11 +165,12 @@ class QLA(FactoredLbfgs):
         assert self._base is not None
         terms, framed = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
         beside = np.flatnonzero(terms.stiffness)
-        nodes = np.unique(terms.nodes[beside])
-        new = COLUMN * np.count_nonzero(~self._has_column[nodes])
+        nodes = terms.nodes[beside]
+        fresh = np.unique(nodes[~self._has_column[nodes]])
+        new = COLUMN * len(fresh)
         if len(beside) > CROWD or new > most:
             return terms, False
-        self._has_column[nodes] = True
+        self._has_column[fresh] = True
         self._beside += new + cost_of_terms(len(beside), *self._measures)
         return terms, self._low_rank.set_terms(terms, framed)
 
@@ -182,7 +184,7 @@ class QLA(FactoredLbfgs):
             self.history.push(old.x, new.x, old.smooth, new.smooth)
         else:
             y = _secant_gradient(new) - _secant_gradient(old)
-            self.history.push(old.x, new.x, np.zeros_like(y), self._damped(problem, old, new.x - old.x, y))
+            self.history.push(old.x, new.x, self._zeros, self._damped(problem, old, new.x - old.x, y))
         self._iterations += 1
         if limited:
             self._mark(new)
