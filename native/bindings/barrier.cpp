@@ -108,6 +108,11 @@ void bind_friction(nb::module_& m) {
   property(terms, "axis", &FrictionTerms::axis);
   property(terms, "stiffness", &FrictionTerms::stiffness);
   property(terms, "slip", &FrictionTerms::slip);
+  terms.def(
+      "secant", [](const FrictionTerms& now, const FrictionTerms& before) { return numpy(now.secant(before)); },
+      nb::arg("before"),
+      "By how much each friction has grown along the change of its slip since `before`, over that change (k,); 0 where "
+      "that is none.");
 
   nb::class_<Friction>(m, "Friction", "Smooth Coulomb friction with lagged normal forces.")
       .def(

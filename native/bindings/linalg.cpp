@@ -2,6 +2,7 @@
 #include <nanobind/stl/pair.h>
 
 #include "bindings/bindings.hpp"
+#include "bindings/rows.hpp"
 
 #include "linalg/carried_inverse.hpp"
 #include "linalg/lbfgs.hpp"
@@ -15,14 +16,6 @@ Precision precision_named(const std::string& name) {
   if (name == "float32") return Precision::float32;
   if (name == "float64") return Precision::float64;
   throw std::invalid_argument("precision is 'float32' or 'float64', not '" + name + "'");
-}
-
-// A NumPy array that owns what was in the vector.
-template <class T>
-auto numpy(std::vector<T>&& values) {
-  auto* kept = new std::vector<T>(std::move(values));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return nb::ndarray<nb::numpy, T, nb::ndim<1>>(kept->data(), {kept->size()}, owner);
 }
 
 void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
@@ -42,6 +35,9 @@ void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
           "set_precision",
           [](SupernodalCholesky& f, const std::string& precision) { f.set_precision(precision_named(precision)); },
           nb::arg("precision"), "Go on in another precision; the factor in place is lost.")
+      .def_prop_ro(
+          "precision",
+          [](const SupernodalCholesky& f) { return f.precision() == Precision::float32 ? "float32" : "float64"; })
       .def(
           "forward_sparse",
           [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {

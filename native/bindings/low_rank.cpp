@@ -1,6 +1,11 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
+
 #include "bindings/bindings.hpp"
 #include "bindings/rows.hpp"
 
+#include "linalg/contact_change.hpp"
 #include "linalg/rank_one_terms.hpp"
 #include "linalg/woodbury_inverse.hpp"
 
@@ -54,12 +59,41 @@ void bind_terms(nb::module_& m) {
           nb::arg("beta"), nb::arg("out").noconvert(), ReleaseGil(), "out += C beta, shapes (k,) and (n, 3).")
       .def(
           "add_product",
-          [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale) {
+          [](const RankOneTerms& terms, const Array<const double>& v, const Array<double>& out, double scale,
+             const std::optional<Array<const double>>& stiffness) {
             terms.check_nodes(static_cast<std::int64_t>(v.size()) / 3);
-            terms.add_product(v.data(), sized(out, static_cast<std::int64_t>(v.size()), "out"), scale);
+            const auto size = static_cast<std::int64_t>(v.size());
+            const auto count = static_cast<std::size_t>(terms.size());
+            const double* k = stiffness ? sized(*stiffness, terms.size(), "stiffness") : terms.all_stiffness().data();
+            terms.add_product(v.data(), sized(out, size, "out"), scale, {k, count});
           },
-          nb::arg("v"), nb::arg("out").noconvert(), nb::arg("scale") = 1.0, ReleaseGil(),
-          "out += scale C K C^T v, both of shape (n, 3).");
+          nb::arg("v"), nb::arg("out").noconvert(), nb::arg("scale") = 1.0, nb::arg("stiffness") = nb::none(),
+          ReleaseGil(), "out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).");
+}
+
+// keys, sliding, nodes, vectors, stiffness
+using TermArrays = std::tuple<Array<const std::int64_t>, Array<const std::int64_t>, Array<const std::int32_t>,
+                              Array<const double>, Array<const double>>;
+
+ContactTerms of_arrays(const TermArrays& arrays) {
+  const auto& [keys, sliding, nodes, vectors, stiffness] = arrays;
+  return {view(keys), view(sliding), view(nodes), view(vectors), view(stiffness)};
+}
+
+void bind_change(nb::module_& m) {
+  m.def(
+      "contact_change",
+      [](const TermArrays& now, const TermArrays& held, const WoodburyInverse& inverse, double scale, double small,
+         double same, double shifted) {
+        ContactChange change = contact_change(of_arrays(now), of_arrays(held), inverse, {scale, small, same, shifted});
+        return std::pair(std::move(change.terms), change.framed);
+      },
+      nb::arg("now"), nb::arg("held"), nb::arg("inverse"), nb::arg("scale"), nb::arg("small"), nb::arg("same"),
+      nb::arg("shifted"),
+      "What a model needs beside a factor that holds other contacts. now, held: pairs of primitives, of contacts (k) "
+      "and of friction (f), then the terms' nodes (t, 4), vectors (t, 4, 3) and stiffness (t): k along normals, 2 f of "
+      "friction, any others; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes "
+      "beside the factor, after them others in the frame of the factor, and how many of these.");
 }
 
 std::shared_ptr<SupernodalCholesky> with_half_solves(const std::shared_ptr<InverseOperator>& factor) {
@@ -109,6 +143,7 @@ void bind_low_rank(nb::module_& m) {
       .def_prop_ro("active_terms", &WoodburyInverse::active_terms, "Terms with a node that is free.")
       .def_prop_ro("columns", &WoodburyInverse::columns, "Nodes whose half-solves are kept.")
       .def_prop_ro("bytes", &WoodburyInverse::bytes, "Memory of the half-solves and their products.");
+  bind_change(m);
 }
 
 }  // namespace qlb

@@ -44,6 +44,21 @@ Friction::Friction(std::span<const std::int32_t> nodes, std::span<const double> 
   }
 }
 
+std::vector<double> FrictionTerms::secant(const FrictionTerms& before) const {
+  if (before.slip.size() != slip.size()) throw std::invalid_argument("before: friction of other contacts");
+  std::vector<double> found(slip.size(), 0.0);
+  for (std::size_t k = 0; k < slip.size(); ++k) {
+    double length = 0.0, growth = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double step = slip[k][i] - before.slip[k][i];
+      length += step * step;
+      growth += step * (stiffness[2 * k + 1] * slip[k][i] - before.stiffness[2 * k + 1] * before.slip[k][i]);
+    }
+    if (length > 0.0) found[k] = growth / length;
+  }
+  return found;
+}
+
 FrictionTerms Friction::evaluate(const double* x, const double* base, std::int64_t count, double epsilon, double scale,
                                  double* gradient) const {
   if (last_node_ >= count)

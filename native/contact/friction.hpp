@@ -27,6 +27,10 @@ struct FrictionTerms {
   std::vector<std::array<double, 3>> axis;
   std::vector<double> stiffness;
   std::vector<std::array<double, 3>> slip;  // of each contact, u [m]
+
+  // By how much the friction of each contact has grown along the change of its slip since `before`, over that change; 0
+  // where that is none. Both of the same contacts.
+  std::vector<double> secant(const FrictionTerms& before) const;
 };
 
 class Friction {

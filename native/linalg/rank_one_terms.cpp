@@ -81,8 +81,9 @@ void RankOneTerms::add(std::int64_t j, double scale, double* out) const {
     for (int c = 0; c < 3; ++c) out[3 * static_cast<std::int64_t>(nodes_[j][i]) + c] += scale * vector_[j][3 * i + c];
 }
 
-void RankOneTerms::add_product(const double* v, double* out, double scale) const {
-  for (std::int64_t j = 0; j < size(); ++j) add(j, scale * stiffness_[j] * dot(j, v), out);
+void RankOneTerms::add_product(const double* v, double* out, double scale, std::span<const double> stiffness) const {
+  for (std::int64_t j = 0; j < size(); ++j)
+    if (stiffness[j] != 0.0) add(j, scale * stiffness[j] * dot(j, v), out);
 }
 
 void RankOneTerms::add_combination(std::span<const double> beta, double* out) const {

@@ -37,7 +37,8 @@ class RankOneTerms {
   double dot(std::int64_t j, const double* v) const;                      // a_j . v, v (nodes, 3)
   void add(std::int64_t j, double scale, double* out) const;              // out += scale a_j
   void add_combination(std::span<const double> beta, double* out) const;  // out += C beta
-  void add_product(const double* v, double* out, double scale) const;     // out += scale C K C^T v
+  // out += scale C K C^T v, K of `stiffness`
+  void add_product(const double* v, double* out, double scale, std::span<const double> stiffness) const;
 
  private:
   void take(std::span<const std::int32_t> nodes, std::span<const double> stiffness);

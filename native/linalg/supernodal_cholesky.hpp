@@ -27,6 +27,7 @@ class SupernodalCholesky : public Cholesky {
 
   // Goes on in another precision; the factor in place is lost.
   void set_precision(Precision precision);
+  Precision precision() const { return entry_bytes() == 4 ? Precision::float32 : Precision::float64; }
 
   std::int64_t size() const override { return 3 * pattern_->nodes(); }
   std::int64_t rows() const { return static_cast<std::int64_t>(supernodes_.dof.size()); }

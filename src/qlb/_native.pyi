@@ -172,6 +172,11 @@ class FrictionTerms:
     @property
     def slip(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 3), writable=False)]: ...
 
+    def secant(self, before: FrictionTerms) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]:
+        """
+        By how much each friction has grown along the change of its slip since `before`, over that change (k,); 0 where that is none.
+        """
+
 class Friction:
     """Smooth Coulomb friction with lagged normal forces."""
 
@@ -369,6 +374,9 @@ class SupernodalCholesky(Cholesky):
     def set_precision(self, precision: str) -> None:
         """Go on in another precision; the factor in place is lost."""
 
+    @property
+    def precision(self) -> str: ...
+
     def forward_sparse(self, dofs: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> tuple[Annotated[NDArray[numpy.int64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]]:
         """
         (rows, values) of y = L^-1 P b, for b zero but at `dofs`; rows in elimination order, ascending.
@@ -429,8 +437,10 @@ class RankOneTerms:
     def add_combination(self, beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
         """out += C beta, shapes (k,) and (n, 3)."""
 
-    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0) -> None:
-        """out += scale C K C^T v, both of shape (n, 3)."""
+    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0, stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).
+        """
 
 class WoodburyInverse(InverseOperator):
     """
@@ -476,6 +486,11 @@ class WoodburyInverse(InverseOperator):
     @property
     def bytes(self) -> int:
         """Memory of the half-solves and their products."""
+
+def contact_change(now: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], held: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
+    """
+    What a model needs beside a factor that holds other contacts. now, held: pairs of primitives, of contacts (k) and of friction (f), then the terms' nodes (t, 4), vectors (t, 4, 3) and stiffness (t): k along normals, 2 f of friction, any others; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
+    """
 
 def simd_levels() -> list[str]:
     """SIMD levels this build and this machine can run, the one in use last"""

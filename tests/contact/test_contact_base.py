@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from qlb import Contact, Plane, Simulation
+from qlb import Contact, Plane, Simulation, _native
 from qlb.contact.stage import ContactPoint, StageContact, Terms
 from qlb.integrators.integrator import Origin, Stage
 from qlb.solvers import QLA
 from qlb.solvers.contact_base import ContactBase
 from qlb.timing import Timer
+from tests.contact.reference_difference import reference_difference
 from tests.contact.scenes import SOFT, UP, block, simulate
 from tests.support import Array
 
@@ -58,10 +59,9 @@ def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(hel
     simulation = resting()
     now, then, x = moved(simulation, rng)
     assert 0 < now.count < then.count
-    terms = then.terms()
-    base = ContactBase.of(then, rng.random(len(terms[2])) < held)
-    lacking, change = base.difference(now, now.terms(), simulation.solver.inverse, 1.0)
-    found = dense(base.held, len(x)) + dense((*now.terms()[:2], lacking), len(x)) + dense(change, len(x))
+    base = ContactBase.of(then, rng.random(len(then.terms()[2])) < held)
+    terms, _ = base.difference(now, now.terms(), simulation.solver.inverse, 1.0)
+    found = dense(base.held, len(x)) + dense((terms.nodes, terms.vectors, terms.stiffness), len(x))
     wanted = dense(now.terms(), len(x))
     np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
 
@@ -71,15 +71,34 @@ def test_by_default_the_model_is_near_enough_along_every_direction(rng):
     now, then, x = moved(simulation, rng)
     scale = 0.05 * then.terms()[2].max()
     base = ContactBase.of(then, np.ones(len(then.terms()[2]), dtype=bool))
-    lacking, change = base.difference(now, now.terms(), simulation.solver.inverse, scale)
+    terms, _ = base.difference(now, now.terms(), simulation.solver.inverse, scale)
     own = scale * np.eye(3 * len(x))  # stands for the bodies
-    found = dense(base.held, len(x)) + dense((*now.terms()[:2], lacking), len(x)) + dense(change, len(x))
+    found = dense(base.held, len(x)) + dense((terms.nodes, terms.vectors, terms.stiffness), len(x))
     model, wanted = own + found, own + dense(now.terms(), len(x))
     factor = np.linalg.inv(np.linalg.cholesky(model))
     spread = np.linalg.eigvalsh(factor @ wanted @ factor.T)
     assert spread.min() > 0.45
     assert spread.max() < 2.2
-    assert len(change[2]) + np.count_nonzero(lacking) < len(then.terms()[2])
+    assert np.count_nonzero(terms.stiffness) < len(then.terms()[2])
+
+
+@pytest.mark.parametrize("softness", [1e-3, 0.05, 1.0])
+def test_what_differs_is_what_numpy_finds(softness, rng):
+    """In a frame that has turned, by the dense sums of all terms beside the factor."""
+    simulation = resting()
+    now, then, x = moved(simulation, rng)
+    base = ContactBase.of(then, rng.random(len(then.terms()[2])) < 0.8)
+    inverse, scale = simulation.solver.inverse, softness * then.terms()[2].max()
+    inverse.carry(x @ (np.eye(3) + rng.uniform(-0.02, 0.02, size=(3, 3))), x, 0.0)
+    terms, framed = base.difference(now, now.terms(), inverse, scale)
+    lacking, change = reference_difference(base, now, now.terms(), inverse, scale)
+    np.testing.assert_array_equal(terms.stiffness[: len(lacking)], lacking)
+    assert framed == len(change[2])
+    assert framed > 0
+    assert np.count_nonzero(lacking) < len(lacking)
+    others = terms.nodes[-framed:], terms.vectors[-framed:], terms.stiffness[-framed:]
+    found, wanted = dense(others, len(x)), dense(change, len(x))
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * scale)
 
 
 def test_a_saved_base_comes_back(rng):
@@ -105,6 +124,23 @@ def test_friction_that_a_step_has_turned_round_holds_along_its_slip():
     np.testing.assert_allclose(turned.after(before).sliding_terms()[2][::2], across)
     for point in (further.after(before), turned.after(replace(before, friction=None))):
         assert (point.sliding_terms()[2][::2] < 0.3 * point.sliding_terms()[2][1::2]).all()
+
+
+def extended(solver: QLA, node: int) -> str:
+    """The precision of the factor once its pattern is extended for a pair."""
+    solver.factor.load({"stencils": np.array([[0.0, 1.0, node, 17.0]])})
+    assert isinstance(solver.factor.cholesky, _native.SupernodalCholesky)
+    return solver.factor.cholesky.precision
+
+
+def test_a_factor_whose_pattern_is_extended_stays_in_single_precision():
+    solver = resting().solver
+    assert isinstance(solver, QLA)
+    first = solver.factor.cholesky
+    assert extended(solver, 16) == "float32"
+    assert solver.factor.cholesky is not first
+    assert solver.factor.raise_precision()
+    assert extended(solver, 15) == "float64"
 
 
 def test_contacts_that_last_stay_in_the_factor():

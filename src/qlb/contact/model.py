@@ -96,7 +96,8 @@ class ContactModel:
 
     def evaluate(self, x: FloatArray, offsets: FloatArray, scale: float, gradient: FloatArray) -> _native.ContactSet:
         """The contacts at `x` (n, 3) [m] among the candidates; `scale` dPhi/dx is added to `gradient` (n, 3)."""
-        planes = np.column_stack([self.normals, offsets])
+        planes = np.empty((len(offsets), 4))
+        planes[:, :3], planes[:, 3] = self.normals, offsets
         pairs = self.candidates.vertex_faces, self.candidates.edge_edges
         return self.barrier.evaluate(x, *pairs, planes, self.plane_allowed, scale, gradient)
 
@@ -107,7 +108,7 @@ class ContactModel:
 
     def plane_gaps(self, x: FloatArray, offsets: FloatArray) -> FloatArray:
         """Distances [m] of `vertices` from each plane, shape (v, q); infinite where they may not touch."""
-        gaps = x[self.vertices] @ self.normals.T - offsets
+        gaps = (x @ self.normals.T)[self.vertices] - offsets
         return np.where(self._near_planes, gaps, np.inf)
 
     def plane_of(self, contacts: _native.ContactSet) -> IntArray:

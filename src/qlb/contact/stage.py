@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,14 +24,10 @@ Terms = tuple[IntArray, FloatArray, FloatArray]
 """A sum of k a a^T: nodes (t, 4), a at each of them (t, 4, 3), and k (t,)."""
 
 
-def joined(first: Terms, second: Terms) -> Terms:
-    """Both sums as one."""
-    (nodes, vectors, stiffness), (others, more_vectors, more_stiffness) = first, second
-    return (
-        np.concatenate([nodes, others]),
-        np.concatenate([vectors, more_vectors]),
-        np.concatenate([stiffness, more_stiffness]),
-    )
+def joined(*sums: Terms) -> Terms:
+    """All sums as one."""
+    nodes, vectors, stiffness = (np.concatenate(parts) for parts in zip(*sums, strict=True))
+    return nodes, vectors, stiffness
 
 
 @dataclass(frozen=True)
@@ -49,11 +46,12 @@ class ContactPoint:
     secant: FloatArray | None = None
     """by how much each friction has grown along the change of its slip since the point before, over that change (f,)"""
 
-    def terms(self) -> Terms:
-        """The Hessian along the normals, then that of friction, as a sum of k a a^T."""
+    def terms(self, *more: Terms) -> Terms:
+        """The Hessian along the normals, then that of friction, as a sum of k a a^T; and `more` after them."""
         c = self.contacts
         normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
-        return normal if self.friction is None else joined(normal, self.sliding_terms())
+        friction = () if self.friction is None else (self.sliding_terms(),)
+        return joined(normal, *friction, *more)
 
     def sliding_terms(self) -> Terms:
         """The Hessian of friction, two terms a contact that was lagged.
@@ -75,11 +73,7 @@ class ContactPoint:
         new, old = self.friction, before.friction
         if new is None or old is None or not np.array_equal(self.sliding_keys, before.sliding_keys):
             return self
-        step = new.slip - old.slip
-        change = new.stiffness[1::2, None] * new.slip - old.stiffness[1::2, None] * old.slip
-        length = np.sum(step**2, axis=1)
-        secant = np.divide(np.sum(change * step, axis=1), length, out=np.zeros_like(length), where=length > 0)
-        return replace(self, secant=secant)
+        return replace(self, secant=new.secant(old))
 
     @property
     def count(self) -> int:
@@ -100,11 +94,12 @@ class StageContact:
         self.model, self._stage, self._scale, self._timer = model, stage, scale, timer
         self._from, self._to = model.offsets(origin.time), model.offsets(stage.time)
         self._offsets = self._from
+        self._still = np.zeros_like(origin.positions)
         self._friction: LaggedFriction | None = None
         self._at_plane: tuple[int, int] | None = None  # node and plane that bounded the last step
         self.friction_pass = 1
         if model.has_friction:
-            self._lag_friction(origin.positions)
+            self._lag_friction(self.at(origin.positions).contacts)
         self._offsets = self._to
 
     @property
@@ -112,11 +107,13 @@ class StageContact:
         """Whether friction is to be taken anew after the solve."""
         return self.model.has_friction and self.friction_pass < self.model.settings.friction_passes
 
-    def follow(self, earlier: StageContact, x: FloatArray) -> None:
-        """Go on after a solve with an `earlier` one of the same stage, which ended at `x` (n, 3) [m]."""
-        self.friction_pass = earlier.friction_pass + 1
+    def refreshed(self, end: ContactPoint) -> StageContact:
+        """The same stage with friction lagged where a solve found its `end`."""
+        following = copy(self)
+        following.friction_pass += 1
         if self.model.has_friction:
-            self._lag_friction(x)
+            following._lag_friction(end.contacts)
+        return following
 
     @property
     def planes_move(self) -> bool:
@@ -127,10 +124,9 @@ class StageContact:
         """Put the planes at the part `s` of their way to where they are in the stage."""
         self._offsets = self._to if s == 1 else (1 - s) * self._from + s * self._to
 
-    def _lag_friction(self, x: FloatArray) -> None:
-        """Take normal forces and directions of sliding at positions `x` (n, 3) [m]."""
-        self._friction = None
-        self._friction = LaggedFriction(self.model, self.at(x).contacts, self._scale, self._plane_motion())
+    def _lag_friction(self, contacts: _native.ContactSet) -> None:
+        """Take normal forces and directions of sliding from `contacts`."""
+        self._friction = LaggedFriction(self.model, contacts, self._scale, self._plane_motion())
 
     def at(self, x: FloatArray) -> ContactPoint:
         """Contact at positions `x` (n, 3) [m]."""
@@ -168,7 +164,7 @@ class StageContact:
     def cover(self, x: FloatArray, p: FloatArray | None) -> None:
         """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""
         candidates, dhat = self.model.candidates, self.model.dhat
-        p = np.zeros_like(x) if p is None else p
+        p = self._still if p is None else p
         with self._timer.section("candidates"):
             if self.model.stale or not candidates.covers(x, p):
                 candidates.build(x, p, MARGIN * dhat, dhat)
@@ -207,14 +203,16 @@ class StageContact:
         gaps = model.plane_gaps(x, self._offsets)
         if gaps.size == 0:
             return 1.0
-        closing = -(p[model.vertices] @ model.normals.T)
+        closing = -(p @ model.normals.T)[model.vertices]
         if moving_planes:
             closing = closing + (self._to - self._offsets)
-        parts = np.full(gaps.shape, 1.0)
-        np.divide(PLANE_SHARE * gaps, closing, out=parts, where=closing > PLANE_SHARE * gaps)
+        most = PLANE_SHARE * gaps
+        too_far = closing > most
+        if not too_far.any():
+            return 1.0
+        parts = np.divide(most, closing, out=np.ones_like(gaps), where=too_far)
         v, q = np.unravel_index(np.argmin(parts), parts.shape)
-        if parts[v, q] < 1:
-            self._at_plane = int(model.vertices[v]), int(q)
+        self._at_plane = int(model.vertices[v]), int(q)
         return float(parts[v, q])
 
     def _plane_motion(self) -> FloatArray:

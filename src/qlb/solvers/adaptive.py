@@ -9,7 +9,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, Terms, joined
+from qlb.contact.stage import ContactPoint, Terms
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.contact_base import SMALL, ContactBase
 from qlb.solvers.line_search import Point
@@ -66,6 +66,7 @@ class QLA(FactoredLbfgs):
         self._base: ContactBase | None = None  # the contacts in it
         self._solves = self._spent = 0  # solves with this factor, and their iterations
         self._has_column = np.zeros(system.nodes, dtype=bool)  # nodes with half-solves over this factor
+        self._zeros = np.zeros((system.nodes, 3))
         self._beside = 0.0  # cost of the terms beside this factor, in iterations
         self._stale = False
 
@@ -124,7 +125,7 @@ class QLA(FactoredLbfgs):
         with problem.timer.section("solve"):
             p = np.empty_like(rest)
             slope = self.history.direction_with(rest, self._low_rank, terms, p, -forces, known)
-            self._p, self._known = p, _native.RankOneTerms(terms.nodes, terms.vectors, known)
+            self._p, self._terms_there, self._known = p, terms, known
             return p, slope
 
     def _terms(
@@ -149,7 +150,7 @@ class QLA(FactoredLbfgs):
             self._low_rank.set_terms(terms)
         known = np.zeros(terms.size)
         known[: len(given[2])] = given[2]
-        known[contact.count : len(contact.terms()[2])] = 0.0
+        known[contact.count : contact.count + 2 * len(contact.sliding_keys)] = 0.0
         return terms, known
 
     def _beside_factor(
@@ -162,16 +163,16 @@ class QLA(FactoredLbfgs):
         """
         assert self._low_rank is not None
         assert self._base is not None
-        lacking, change = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
-        terms = _native.RankOneTerms(*joined((given[0], given[1], lacking), change))
+        terms, framed = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
         beside = np.flatnonzero(terms.stiffness)
-        nodes = np.unique(terms.nodes[beside])
-        new = COLUMN * np.count_nonzero(~self._has_column[nodes])
+        nodes = terms.nodes[beside]
+        fresh = np.unique(nodes[~self._has_column[nodes]])
+        new = COLUMN * len(fresh)
         if len(beside) > CROWD or new > most:
             return terms, False
-        self._has_column[nodes] = True
+        self._has_column[fresh] = True
         self._beside += new + cost_of_terms(len(beside), *self._measures)
-        return terms, self._low_rank.set_terms(terms, len(change[2]))
+        return terms, self._low_rank.set_terms(terms, framed)
 
     def accept(self, problem: StageProblem, old: Point, new: Point, *, limited: bool) -> None:
         """Store the pair, of the gradient without contact, and count the iteration.
@@ -183,7 +184,7 @@ class QLA(FactoredLbfgs):
             self.history.push(old.x, new.x, old.smooth, new.smooth)
         else:
             y = _secant_gradient(new) - _secant_gradient(old)
-            self.history.push(old.x, new.x, np.zeros_like(y), self._damped(problem, old, new.x - old.x, y))
+            self.history.push(old.x, new.x, self._zeros, self._damped(problem, old, new.x - old.x, y))
         self._iterations += 1
         if limited:
             self._mark(new)
@@ -196,7 +197,7 @@ class QLA(FactoredLbfgs):
         """
         system = problem.system
         Bs = -system.norm(s) / system.norm(self._p) * old.gradient
-        self._known.add_product(s, Bs, -1.0)
+        self._terms_there.add_product(s, Bs, -1.0, self._known)
         system.clear_held(Bs)
         sBs, sy = system.dot(s, Bs), system.dot(s, y)
         if sy >= DAMPING * sBs:

@@ -79,7 +79,7 @@ class Descent(ABC):
         result = self.minimise(problem) if problem.contact is None else self._solve_with_contact(problem)
         iterations = -1
         while result.reason.converged and result.iterations > iterations:
-            refreshed = problem.refreshed(result.positions)
+            refreshed = problem.refreshed(result.positions, result.contact)
             if refreshed is None:
                 break
             problem, iterations = refreshed, result.iterations

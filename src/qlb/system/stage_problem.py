@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, StageContact, Terms, joined
+from qlb.contact.stage import ContactPoint, StageContact, Terms
 from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
@@ -63,13 +64,14 @@ class StageProblem:
         self._potentials = [*system.potentials, *at_stage.values()]
         self._added = [at_stage[term] for term in system.added if term in at_stage]
         self.origin = origin or Origin(state.positions, state.time)
+        self._last: tuple[FloatArray, float, FloatArray] | None = None
         self.contact: StageContact | None = None
         """Contact in this stage, where the system has any."""
         if system.contact is not None:
             self.contact = StageContact(system.contact, stage, self.force_scale, self.origin, timer)
 
-    def refreshed(self, x: FloatArray) -> StageProblem | None:
-        """The problem with what it lags taken at `x` (n, 3) [m]; None where that is of no need.
+    def refreshed(self, x: FloatArray, end: ContactPoint | None) -> StageProblem | None:
+        """The problem with what it lags taken at `x` (n, 3) [m], contact `end` there; None where that is of no need.
 
         With inertia the predictor is near enough for the order of the integrator; statics has no time step that would
         make what is lagged small. Friction is taken anew as often as its settings say.
@@ -78,10 +80,11 @@ class StageProblem:
         slides = self.contact is not None and self.contact.may_lag_friction
         if not lagged and not slides:
             return None
-        guess = x if lagged else self._guess
-        problem = StageProblem(self.system, self.stage, self._state, self.timer, guess, self.origin)
-        if self.contact is not None and problem.contact is not None:
-            problem.contact.follow(self.contact, x)
+        problem = copy(self)
+        if lagged:
+            problem = StageProblem(self.system, self.stage, self._state, self.timer, x, self.origin)
+        if self.contact is not None and end is not None:
+            problem.contact = self.contact.refreshed(end)
         return problem
 
     @property
@@ -140,14 +143,18 @@ class StageProblem:
         """E without contact and its gradient at positions `x` [m].
 
         In kg m^2 and kg m (J and N in quasistatics); the gradient has shape (n, 3), zero at held degrees of freedom.
+        What was found last is not worked out again: where a solve ends the next pass begins.
         """
+        if self._last is not None and np.array_equal(self._last[0], x):
+            return self._last[1:]
         system, gradient, energy = self.system, np.zeros_like(x), 0.0
         with self.timer.section("gradient"):
             for potential in self._potentials:
                 energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
-        return energy, system.clear_held(gradient)
+        self._last = x.copy(), energy, system.clear_held(gradient)
+        return self._last[1:]
 
     def hessian(
         self, x: FloatArray, *, project: bool, matrix: _native.BlockMatrix | None = None
@@ -174,7 +181,7 @@ class StageProblem:
         assert self.system.contact is not None
         bending = self.system.contact.barrier.bending(x, contact.contacts, BENDING * self.node_stiffness)
         vectors = bending.vectors.reshape(-1, 4, 3)
-        return joined(contact.terms(), (bending.nodes, vectors, bending.stiffness))
+        return contact.terms((bending.nodes, vectors, bending.stiffness))
 
     @cached_property
     def node_stiffness(self) -> float:

@@ -1,0 +1,189 @@
+#include "linalg/contact_change.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "contact/jacobi.hpp"
+
+namespace qlb {
+namespace {
+
+using Vector = std::array<double, 12>;  // one for each of four nodes
+using Weights = std::array<double, 4>;
+
+// Where in `a` and `b` the keys are that both have, in ascending order of the keys.
+std::vector<std::pair<std::int64_t, std::int64_t>> in_common(std::span<const std::int64_t> a,
+                                                             std::span<const std::int64_t> b) {
+  const auto ascending = [](std::span<const std::int64_t> keys) {
+    std::vector<std::int64_t> order(keys.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::ranges::sort(order, {}, [&](std::int64_t k) { return keys[k]; });
+    return order;
+  };
+  std::vector<std::pair<std::int64_t, std::int64_t>> pairs;
+  const std::vector<std::int64_t> in_a = ascending(a), in_b = ascending(b);
+  for (std::size_t i = 0, j = 0; i < in_a.size() && j < in_b.size();) {
+    const std::int64_t left = a[in_a[i]], right = b[in_b[j]];
+    if (left == right) pairs.emplace_back(in_a[i], in_b[j]);
+    i += left <= right;
+    j += right <= left;
+  }
+  return pairs;
+}
+
+double dot3(const double* a, const double* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+int longest(const Vector& a) {
+  int at = 0;
+  for (int i = 1; i < 4; ++i)
+    if (dot3(&a[3 * i], &a[3 * i]) > dot3(&a[3 * at], &a[3 * at])) at = i;
+  return at;
+}
+
+// What each of four nodes has of the vector at node `at`; infinite where that is 0.
+Weights weights(const Vector& a, int at) {
+  const double length = dot3(&a[3 * at], &a[3 * at]);
+  Weights w;
+  for (int i = 0; i < 4; ++i)
+    w[i] = length > 0.0 ? dot3(&a[3 * i], &a[3 * at]) / length : std::numeric_limits<double>::infinity();
+  return w;
+}
+
+// The sum of k a a^T over the two terms of friction, at node `at`.
+Square<3> block(const std::array<Vector, 2>& a, const double* stiffness, int at) {
+  Square<3> sum{};
+  for (int t = 0; t < 2; ++t)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) sum[i][j] += stiffness[t] * a[t][3 * at + i] * a[t][3 * at + j];
+  return sum;
+}
+
+double along(const std::array<double, 3>& axis, const Square<3>& A) {
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) sum += axis[i] * dot3(A[i].data(), axis.data());
+  return sum;
+}
+
+class Comparison {
+ public:
+  Comparison(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse, const Nearness& near)
+      : now_(now), held_(held), inverse_(inverse), near_(near), small_(near.small * near.scale) {
+    lacking_.assign(now.stiffness.begin(), now.stiffness.end());
+    change_.resize(held.stiffness.size());
+    std::ranges::transform(held.stiffness, change_.begin(), std::negate<>());
+  }
+
+  ContactChange result() {
+    for (const auto& [here, there] : in_common(now_.keys, held_.keys)) compare_normals(here, there);
+    for (const auto& [here, there] : in_common(now_.sliding, held_.sliding))
+      compare_sliding(now_.keys.size() + 2 * here, held_.keys.size() + 2 * there);
+    std::vector<std::int32_t> nodes(now_.nodes.begin(), now_.nodes.end());
+    std::vector<double> vectors(now_.vectors.begin(), now_.vectors.end()), stiffness = std::move(lacking_);
+    std::int64_t framed = std::ssize(turned_stiffness_);
+    for (std::size_t k = 0; k < change_.size(); ++k) {
+      if (std::abs(change_[k]) <= small_) continue;
+      const auto at = held_.nodes.begin() + 4 * k;
+      nodes.insert(nodes.end(), at, at + 4);
+      const auto a = held_.vectors.begin() + 12 * k;
+      vectors.insert(vectors.end(), a, a + 12);
+      stiffness.push_back(change_[k]);
+      ++framed;
+    }
+    nodes.insert(nodes.end(), turned_nodes_.begin(), turned_nodes_.end());
+    vectors.insert(vectors.end(), turned_vectors_.begin(), turned_vectors_.end());
+    stiffness.insert(stiffness.end(), turned_stiffness_.begin(), turned_stiffness_.end());
+    return {RankOneTerms(nodes, vectors, stiffness), framed};
+  }
+
+ private:
+  bool alike(double a, double b) const {
+    return (a <= near_.same * b && b <= near_.same * a) || (a <= small_ && b <= small_);
+  }
+
+  // Of now, in the frame of the factor.
+  Vector pulled_back(std::int64_t row) const {
+    Vector out;
+    inverse_.pull_back(now_.nodes.subspan(4 * row, 4), now_.vectors.subspan(12 * row, 12), out.data());
+    return out;
+  }
+
+  Vector as_held(std::int64_t row) const {
+    Vector out;
+    std::copy_n(held_.vectors.begin() + 12 * row, 12, out.begin());
+    return out;
+  }
+
+  // Along nearly the same normal only the change counts.
+  void compare_normals(std::int64_t here, std::int64_t there) {
+    const double now = now_.stiffness[here], then = held_.stiffness[there];
+    const Vector a = pulled_back(here), b = as_held(there);
+    double turn = 0.0;
+    for (int i = 0; i < 12; ++i) turn += (a[i] - b[i]) * (a[i] - b[i]);
+    if (!(std::max(now, then) * turn <= 0.5 * near_.scale)) return;
+    lacking_[here] = 0.0;
+    change_[there] = alike(now, then) ? 0.0 : now - then;
+  }
+
+  // The two terms of friction turn with the slip; compared are the 3x3 blocks that they make at one node of a contact.
+  void compare_sliding(std::int64_t here, std::int64_t there) {
+    const std::array<Vector, 2> a{pulled_back(here), pulled_back(here + 1)}, b{as_held(there), as_held(there + 1)};
+    const int at = longest(b[0]);
+    const Weights weight = weights(b[0], at), weight_now = weights(a[0], at);
+    double shift = 0.0;
+    for (int i = 0; i < 4; ++i) shift += (weight[i] - weight_now[i]) * (weight[i] - weight_now[i]);
+    if (!(shift <= near_.shifted)) return;
+    lacking_[here] = lacking_[here + 1] = change_[there] = change_[there + 1] = 0.0;
+    const Square<3> now = block(a, &now_.stiffness[here], at), then = block(b, &held_.stiffness[there], at);
+    Square<3> difference, axes;
+    double most = 0.0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) most = std::max(most, std::abs(difference[i][j] = now[i][j] - then[i][j]));
+    if (!(most > small_)) return;
+    jacobi_eigen<3>(difference, axes);
+    for (int k = 0; k < 3; ++k)
+      if (std::abs(difference[k][k]) > small_ && !alike(along(axes[k], now), along(axes[k], then)))
+        add_turned(there, weight, axes[k], difference[k][k]);
+  }
+
+  void add_turned(std::int64_t there, const Weights& weight, const std::array<double, 3>& axis, double stiffness) {
+    for (int i = 0; i < 4; ++i) {
+      turned_nodes_.push_back(held_.nodes[4 * there + i]);
+      for (const double v : axis) turned_vectors_.push_back(weight[i] * v);
+    }
+    turned_stiffness_.push_back(stiffness);
+  }
+
+  const ContactTerms &now_, &held_;
+  const WoodburyInverse& inverse_;
+  Nearness near_;
+  double small_;
+  std::vector<double> lacking_, change_;  // beside the factor: of the terms of now, of those that it holds
+  std::vector<std::int32_t> turned_nodes_;
+  std::vector<double> turned_vectors_, turned_stiffness_;  // of friction, by eigenvectors
+};
+
+void check(const ContactTerms& terms, const char* name) {
+  const std::size_t count = terms.stiffness.size();
+  if (terms.nodes.size() != 4 * count || terms.vectors.size() != 12 * count ||
+      terms.keys.size() + 2 * terms.sliding.size() > count)
+    throw std::invalid_argument(std::string(name) + ": keys, nodes, vectors and stiffness differ in size");
+}
+
+}  // namespace
+
+ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse,
+                             const Nearness& near) {
+  check(now, "now");
+  check(held, "held");
+  return Comparison(now, held, inverse, near).result();
+}
+
+}  // namespace qlb

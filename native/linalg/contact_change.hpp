@@ -1,0 +1,34 @@
+// By what the terms of contacts differ from those that a factor holds.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "linalg/rank_one_terms.hpp"
+#include "linalg/woodbury_inverse.hpp"
+
+namespace qlb {
+
+// A sum of k a a^T: of contacts along their normals, then of friction, two a contact, then any others.
+struct ContactTerms {
+  std::span<const std::int64_t> keys, sliding;  // pairs of primitives, each once: of contacts, and of friction
+  std::span<const std::int32_t> nodes;          // (count, 4)
+  std::span<const double> vectors, stiffness;   // (count, 4, 3), (count)
+};
+
+// What is near enough: stiffness within a factor `same`, or on both sides below `small`; normals that turn by less than
+// the stiffness of the bodies, `scale`, would see; friction whose weights of nodes have a squared change of `shifted`.
+struct Nearness {
+  double scale, small, same, shifted;
+};
+
+struct ContactChange {
+  RankOneTerms terms;       // those of now, with the stiffness that goes beside the factor; then the others
+  std::int64_t framed = 0;  // how many others: in the frame of the factor, negative where it has too much
+};
+
+// `held`: in the frame of the factor that `inverse` is over.
+ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse,
+                             const Nearness& near);
+
+}  // namespace qlb

@@ -1,0 +1,68 @@
+"""By what contacts differ from those in a factor, in NumPy: what the native `contact_change` is compared with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from qlb import _native
+from qlb.arrays import BoolArray, IntArray
+from qlb.contact.stage import ContactPoint, Terms, joined
+from qlb.solvers.contact_base import SAME, SHIFTED, SMALL, ContactBase
+from tests.support import Array
+
+
+def reference_difference(
+    base: ContactBase, contact: ContactPoint, terms: Terms, inverse: _native.WoodburyInverse, scale: float
+) -> tuple[Array, Terms]:
+    """The stiffness of each of `terms` beside the factor, and the terms in the frame of the factor."""
+    lacking, change = terms[2].copy(), -base.terms[2]
+    _, here, there = np.intersect1d(contact.contacts.key, base.keys, return_indices=True)
+    now, then = terms[2][here], base.terms[2][there]
+    turn = _pulled_back(inverse, terms[0][here], terms[1][here]) - base.terms[1][there]
+    parallel = np.maximum(now, then) * np.sum(turn**2, axis=(1, 2)) <= 0.5 * scale
+    lacking[here[parallel]] = 0.0
+    change[there[parallel]] = np.where(_alike(now, then, scale), 0.0, now - then)[parallel]
+
+    _, here, there = np.intersect1d(contact.sliding_keys, base.sliding, return_indices=True)
+    rows = (contact.count + 2 * here)[:, None] + [0, 1]
+    base_rows = (len(base.keys) + 2 * there)[:, None] + [0, 1]
+    nodes, old, held = (part[base_rows] for part in base.terms)
+    new = _pulled_back(inverse, terms[0][rows], terms[1][rows])
+    at = np.argmax(np.sum(old[:, 0] ** 2, axis=2), axis=1)
+    weight = _weights(old[:, 0], at)
+    same = np.sum((weight - _weights(new[:, 0], at)) ** 2, axis=1) <= SHIFTED
+    lacking[rows[same]] = change[base_rows[same]] = 0.0
+    block, block_then = _block(new, terms[2][rows], at), _block(old, held, at)
+    k = np.flatnonzero(same & (np.abs(block - block_then).max(axis=(1, 2)) > SMALL * scale))
+    sizes, axes = np.linalg.eigh(block[k] - block_then[k])
+    side, side_then = (np.einsum("kia,kij,kja->ka", axes, b[k], axes) for b in (block, block_then))
+    c, a = np.nonzero(~_alike(side, side_then, scale) & (np.abs(sizes) > SMALL * scale))
+    vectors = weight[k[c], :, None] * axes[c, :, a][:, None, :]
+
+    change[np.abs(change) <= SMALL * scale] = 0.0
+    kept = np.flatnonzero(change)
+    others = base.terms[0][kept], base.terms[1][kept], change[kept]
+    return lacking, joined(others, (nodes[k[c], 0], vectors, sizes[c, a]))
+
+
+def _pulled_back(inverse: _native.WoodburyInverse, nodes: IntArray, vectors: Array) -> Array:
+    out = np.empty_like(vectors)
+    inverse.pull_back(np.ascontiguousarray(nodes), np.ascontiguousarray(vectors), out)
+    return out
+
+
+def _weights(vectors: Array, at: IntArray) -> Array:
+    """What each of four nodes has of the vector of vectors (k, 4, 3) at node `at`, shape (k, 4)."""
+    reference = vectors[np.arange(len(at)), at]
+    return np.asarray(np.einsum("kni,ki->kn", vectors, reference) / np.sum(reference**2, axis=1)[:, None])
+
+
+def _block(vectors: Array, stiffness: Array, at: IntArray) -> Array:
+    """The sum of k a a^T over the two terms of each contact, vectors (k, 2, 4, 3), at node `at`; shape (k, 3, 3)."""
+    a = vectors[np.arange(len(at)), :, at]
+    return np.asarray(np.einsum("kt,kti,ktj->kij", stiffness, a, a))
+
+
+def _alike(now: Array, then: Array, scale: float) -> BoolArray:
+    near = (now <= SAME * then) & (then <= SAME * now)
+    return np.asarray(near | ((now <= SMALL * scale) & (then <= SMALL * scale)))
