@@ -4,9 +4,10 @@ BIN := .venv/bin
 BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
 NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
 WEB := scripts/build-web.sh $(shell find web -type f -not -path '*/node_modules/*')
-FORMATTED := src tests benchmarks examples docs
+FORMATTED := src tests benchmarks examples docs fuzz
+FUZZ_SECONDS ?= 60
 
-.PHONY: run test wheel quick lint format stubs bench docs site links setup clean
+.PHONY: run test wheel quick sanitize coverage fuzz lint format stubs bench docs site links setup clean
 
 run: setup  ## Run the bar; leaves a picture, a plot and a report below runs/
 	$(BIN)/qlb run bar
@@ -16,6 +17,17 @@ test: setup lint  ## Lint, type check and every test
 
 quick: setup lint  ## Lint, type check and the fast tests
 	$(BIN)/pytest -n 2 -m "not slow"
+
+sanitize: setup  ## The fast tests of the native module under sanitizers: address and undefined behaviour, then threads
+	./scripts/sanitize.sh address
+	./scripts/sanitize.sh thread
+
+coverage: setup  ## Line coverage of Python and C++ by the fast tests; pages in build/coverage
+	./scripts/coverage.sh
+
+fuzz: setup  ## Scene and mesh files at random, FUZZ_SECONDS each
+	$(BIN)/python fuzz/scenes.py -max_total_time=$(FUZZ_SECONDS)
+	$(BIN)/python fuzz/meshes.py -max_total_time=$(FUZZ_SECONDS)
 
 lint: setup
 	$(BIN)/ruff format --check --quiet $(FORMATTED)

@@ -1,8 +1,8 @@
 """Fuzz target: mesh files in the formats that Python reads. Each is a mesh, or there is one `InputError` of one line.
 
 The first byte of an input chooses the suffix, the rest is the file. The reader of `qlb.mesh.worker` runs within this
-process, with the limits that the process of its own has otherwise. OpenUSD's readers, compiled, are left out: where they
-crash, that process is what ends.
+process, with the limits that the process of its own has otherwise. OpenUSD's readers, compiled, are left out: where
+they crash, that process is what ends.
 """
 
 from __future__ import annotations
@@ -85,16 +85,53 @@ def _seeds() -> dict[str, bytes]:
         for form in ("obj", "stl", "stl_ascii", "ply", "off", "glb"):
             made = surface.export(file_type=form)
             seeds[f"{form}.{form.removesuffix('_ascii')}"] = made if isinstance(made, bytes) else made.encode()
-        for name, content in surface.export(file_type="gltf").items():
-            if name.endswith(".gltf"):
-                seeds[name] = content
+        seeds |= {name: made for name, made in surface.export(file_type="gltf").items() if name.endswith(".gltf")}
     return {name: bytes([SUFFIXES.index(Path(name).suffix)]) + content for name, content in seeds.items()}
 
 
-WORDS = """$Nodes $EndNodes $Elements $EndElements $PhysicalNames $Entities 2.2 4.1 POINTS CELLS CELL_TYPES ASCII BINARY
-DATASET UNSTRUCTURED_GRID element vertex face property list uchar binary_little_endian end_header OFF solid facet vertex
-endfacet Vertices Tetrahedra Triangles End usemtl mtllib accessors bufferViews byteOffset componentType nan inf -1
-1000000000000""".split()
+WORDS = [
+    "$Nodes",
+    "$EndNodes",
+    "$Elements",
+    "$EndElements",
+    "$PhysicalNames",
+    "$Entities",
+    "2.2",
+    "4.1",
+    "POINTS",
+    "CELLS",
+    "CELL_TYPES",
+    "ASCII",
+    "BINARY",
+    "DATASET",
+    "UNSTRUCTURED_GRID",
+    "element",
+    "vertex",
+    "face",
+    "property",
+    "list",
+    "uchar",
+    "binary_little_endian",
+    "end_header",
+    "OFF",
+    "solid",
+    "facet",
+    "endfacet",
+    "Vertices",
+    "Tetrahedra",
+    "Triangles",
+    "End",
+    "usemtl",
+    "mtllib",
+    "accessors",
+    "bufferViews",
+    "byteOffset",
+    "componentType",
+    "nan",
+    "inf",
+    "-1",
+    "1000000000000",
+]
 
 if __name__ == "__main__":
     files.ask = ask

@@ -1,4 +1,4 @@
-"""What the fuzz targets share: a seed corpus below build/fuzz, one file to write each input to, and the run of Atheris."""
+"""What the fuzz targets share: a corpus below build/fuzz, a file to write each input to, the run of Atheris."""
 
 from __future__ import annotations
 

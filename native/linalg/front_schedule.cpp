@@ -8,7 +8,7 @@ namespace {
 class TwoStacks {
  public:
   TwoStacks(const Supernodes& supernodes, std::span<const std::int64_t> size, std::vector<std::int64_t>& offset)
-      : supernodes_(supernodes), size_(size), offset_(offset), odd_(supernodes.count(), 0) {
+      : size_(size), offset_(offset), odd_(supernodes.count(), 0) {
     for (std::int32_t s = supernodes.count() - 1; s >= 0; --s)
       if (supernodes.parent[s] >= 0) odd_[s] = !odd_[supernodes.parent[s]];
   }
@@ -28,7 +28,6 @@ class TwoStacks {
   }
 
  private:
-  const Supernodes& supernodes_;
   std::span<const std::int64_t> size_;
   std::vector<std::int64_t>& offset_;
   std::vector<std::uint8_t> odd_;

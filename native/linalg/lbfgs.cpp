@@ -74,7 +74,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
 
   std::copy(g, g + size_, work_.data());
   for (int k = count_ - 1; k >= 0; --k) {
-    const double *along = &along_s_[k * count], *change = &change_[k * count];
+    const double *along = along_s_.data() + k * count, *change = change_.data() + k * count;
     alpha_[k] = (dot(s(k), work_.data(), size_, threads_) + few_dot(along, beta_.data())) / with_terms_[k];
     add_scaled(-alpha_[k], y(k), work_.data(), size_, threads_);
     few_add(-alpha_[k], change, beta_);
@@ -84,7 +84,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
   else
     inner.apply_split(work_.data(), terms, beta_.data(), p, along_.data());
   for (int k = 0; k < count_; ++k) {
-    const double *along = &along_s_[k * count], *change = &change_[k * count];
+    const double *along = along_s_.data() + k * count, *change = change_.data() + k * count;
     const double weight = alpha_[k] - (dot(y(k), p, size_, threads_) + few_dot(change, along_.data())) / with_terms_[k];
     add_scaled(weight, s(k), p, size_, threads_);
     few_add(weight, along, along_);

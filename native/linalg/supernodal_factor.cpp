@@ -107,7 +107,8 @@ std::int64_t SupernodalFactor<T>::factorise(const double* values) {
       for (std::int32_t s = first; s < last && !after_failure(s); ++s) eliminate_front(s, thread, false);
     }
     one_by_one(
-        factor_schedule_.top, [&](std::int32_t s) { return supernodes_.flops(s) > kSharedFlops; },
+        factor_schedule_.top.begin(), factor_schedule_.top.end(),
+        [&](std::int32_t s) { return supernodes_.flops(s) > kSharedFlops; },
         [&](std::int32_t s, bool shared) { eliminate_front(s, thread, shared); }, after_failure);
   }
   return failed_ == kNone ? -1 : failed_.load();

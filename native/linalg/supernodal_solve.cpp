@@ -2,7 +2,6 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <ranges>
 
 #include "linalg/supernodal_factor.hpp"
 #include "linalg/teamwork.hpp"
@@ -113,7 +112,8 @@ void SupernodalFactor<T>::forward_team(T* y, std::int64_t ld, int sides) {
     for (std::int32_t s = solve_schedule_.subtrees[k].first; s < solve_schedule_.subtrees[k].last; ++s)
       forward_front(s, thread, false, y, ld, sides);
   one_by_one(
-      solve_schedule_.top, [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; },
+      solve_schedule_.top.begin(), solve_schedule_.top.end(),
+      [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; },
       [&](std::int32_t s, bool shared) { forward_front(s, thread, shared, y, ld, sides); },
       [](std::int32_t) { return false; });
 }
@@ -124,7 +124,7 @@ void SupernodalFactor<T>::backward_team(T* y, std::int64_t ld, int sides) {
   const FlushSubnormals flush;
   const auto subtrees = static_cast<std::int64_t>(solve_schedule_.subtrees.size());
   one_by_one(
-      std::views::reverse(solve_schedule_.top),
+      solve_schedule_.top.rbegin(), solve_schedule_.top.rend(),
       [&](std::int32_t s) { return supernodes_.nonzeros(s) * sides > kSharedEntries; },
       [&](std::int32_t s, bool shared) { backward_front(s, thread, shared, y, ld, sides); },
       [](std::int32_t) { return false; });

@@ -28,16 +28,17 @@ void once(bool shared, const F& f) {
   }
 }
 
-// Calls f(item, shared) for one item after the other, by a team whose threads all call this: shared by all where
-// worth(item), else by one thread for each run of such items. Ends at the first item for which stop(item) holds.
-template <class Items, class Worth, class F, class Stop>
-void one_by_one(const Items& items, const Worth& worth, const F& f, const Stop& stop) {
-  for (auto item = items.begin(); item != items.end() && !stop(*item);) {
+// Calls f(item, shared) for one item after the other of [item, end), by a team whose threads all call this: shared by
+// all where worth(item), else by one thread for each run of such items. Ends at the first item for which stop(item)
+// holds.
+template <class Item, class Worth, class F, class Stop>
+void one_by_one(Item item, Item end, const Worth& worth, const F& f, const Stop& stop) {
+  while (item != end && !stop(*item)) {
     if (worth(*item)) {
       f(*item++, true);
       continue;
     }
-    const auto last = std::find_if(item, items.end(), worth);
+    const auto last = std::find_if(item, end, worth);
 #pragma omp barrier  // nothing may change stop(item) before all have asked
     once(true, [&] {
       for (auto k = item; k != last && !stop(*k); ++k) f(*k, false);
