@@ -2,8 +2,8 @@
 
     .venv/bin/python scripts/check_wheel.py dist/qlb-*.whl
 
-Fails unless the libraries that the wheel brings are those that are loaded, the scripts of reports and all licences are in
-it, and a run gives the same bits.
+Fails unless the libraries that the wheel brings are those that are loaded, the scripts of reports and all licences
+are in it, and a run gives the same bits.
 """
 
 from __future__ import annotations
