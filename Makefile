@@ -4,7 +4,7 @@ BIN := .venv/bin
 BUILD_REQUIRES := scikit-build-core==1.1.2 nanobind==3.1.0
 NATIVE := CMakeLists.txt pyproject.toml $(shell find native -type f)
 WEB := scripts/build-web.sh $(shell find web -type f -not -path '*/node_modules/*')
-FORMATTED := src tests benchmarks examples docs fuzz
+FORMATTED := src tests benchmarks examples docs scripts fuzz
 FUZZ_SECONDS ?= 60
 
 .PHONY: run test wheel quick sanitize coverage fuzz lint format stubs bench docs site links setup clean
