@@ -36,6 +36,6 @@ esac
 [ $# -gt 0 ] || set -- -m "not slow" $tests
 
 export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
-export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1:suppressions=$PWD/scripts/thread_sanitizer.txt"
+export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1"
 # Capture by Python alone: a sanitizer writes to the terminal, and ends the process.
 LD_PRELOAD=$preload exec setarch -R "build/$kind/venv/bin/python" -m pytest --capture=sys -p no:cacheprovider "$@"
