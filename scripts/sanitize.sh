@@ -2,7 +2,7 @@
 # Builds the native module under sanitizers and runs tests of it, the fast ones unless arguments say otherwise:
 #   scripts/sanitize.sh address [pytest arguments]   AddressSanitizer, UndefinedBehaviorSanitizer, bounds of the library
 #   scripts/sanitize.sh thread [pytest arguments]    ThreadSanitizer
-# The first finding ends the run; a known one: `tile` reads, and drops, values past its columns that other threads write. What is not built here (CPython, NumPy, METIS, CHOLMOD) is not looked into, but its use
+# The first finding ends the run; thread_sanitizer.txt lists the known ones. What is not built here (CPython, NumPy, METIS, CHOLMOD) is not looked into, but its use
 # of memory is. Leaks are left out: CPython keeps what it has at exit.
 set -eu
 cd "$(dirname "$0")/.."
@@ -36,6 +36,6 @@ esac
 [ $# -gt 0 ] || set -- -m "not slow" $tests
 
 export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
-export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1"
+export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1:suppressions=$PWD/scripts/thread_sanitizer.txt"
 # Capture by Python alone: a sanitizer writes to the terminal, and ends the process.
 LD_PRELOAD=$preload exec setarch -R "build/$kind/venv/bin/python" -m pytest --capture=sys -p no:cacheprovider "$@"
