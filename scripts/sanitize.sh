@@ -2,8 +2,8 @@
 # Builds the native module under sanitizers and runs tests of it, the fast ones unless arguments say otherwise:
 #   scripts/sanitize.sh address [pytest arguments]   AddressSanitizer, UndefinedBehaviorSanitizer, bounds of the library
 #   scripts/sanitize.sh thread [pytest arguments]    ThreadSanitizer
-# The first finding ends the run; thread_sanitizer.txt lists the known ones. What is not built here (CPython, NumPy, METIS, CHOLMOD) is not looked into, but its use
-# of memory is. Leaks are left out: CPython keeps what it has at exit.
+# The first finding ends the run; thread_sanitizer.txt lists the known ones. What is not built here (CPython, NumPy, METIS,
+# CHOLMOD) is not looked into, but its use of memory is. Leaks are left out: CPython keeps what it has at exit.
 set -eu
 cd "$(dirname "$0")/.."
 kind=$1
