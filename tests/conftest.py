@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from qlb.results import RenderingFailed, rendering
+
 
 @pytest.fixture
 def rng() -> np.random.Generator:
@@ -19,3 +21,12 @@ def cache_of_meshes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("QLB_CACHE", str(folder))
         yield folder
+
+
+@pytest.fixture
+def can_render() -> None:
+    pytest.importorskip("pyvista")
+    try:
+        rendering.window_class()
+    except RenderingFailed as error:
+        pytest.skip(str(error))

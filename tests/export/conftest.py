@@ -7,7 +7,7 @@ import pytest
 
 import qlb
 from qlb.mesh import EmbeddedSurface
-from qlb.results import RenderingFailed, Run, RunWriter, rendering
+from qlb.results import Run, RunWriter
 
 STEPS = 4
 
@@ -54,15 +54,6 @@ def bar(tmp_path: Path) -> Run:
         for result in simulation.run(3):
             writer.record(result)
     return Run(tmp_path / "bar")
-
-
-@pytest.fixture
-def can_render() -> None:
-    pytest.importorskip("pyvista")
-    try:
-        rendering.window_class()
-    except RenderingFailed as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

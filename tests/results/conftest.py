@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import qlb
-from qlb.results import RenderingFailed, Run, RunWriter, rendering
+from qlb.results import Run, RunWriter
 
 SCENE = {"scene": "bar", "material": {"young": 2e4, "poisson": 0.49}, "mesh": {"cells": [4, 1, 1]}, "steps": 3}
 
@@ -42,12 +42,3 @@ def make_run(tmp_path: Path, make_simulation: MakeSimulation) -> MakeRun:
         return Run(tmp_path / name)
 
     return make
-
-
-@pytest.fixture
-def can_render() -> None:
-    pytest.importorskip("pyvista")
-    try:
-        rendering.window_class()
-    except RenderingFailed as error:
-        pytest.skip(str(error))
