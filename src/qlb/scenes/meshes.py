@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from abc import abstractmethod
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -23,9 +24,9 @@ from qlb.shapes.mesher import FEWEST, MOST
 class MeshSettings(Settings):
     """What a body or an obstacle is made of."""
 
+    @abstractmethod
     def make(self) -> TetMesh:
         """The mesh. Raises `InputError` where the settings make none."""
-        raise NotImplementedError
 
     def surface(self) -> tuple[FloatArray, IntArray]:
         """Vertices [m] (q, 3) and triangles (t, 3) of the surface. Raises `InputError` as `make`."""

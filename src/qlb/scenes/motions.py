@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -22,9 +23,9 @@ Vectors = Annotated[tuple[Vector, ...], Field(min_length=1)]
 class MotionSettings(Settings):
     """A motion that a file can write down."""
 
+    @abstractmethod
     def motion(self) -> Motion:
         """As `Simulation.move` and obstacles take it. Raises `InputError` where it makes none."""
-        raise NotImplementedError
 
     @model_validator(mode="after")
     def _check(self) -> MotionSettings:
