@@ -4,6 +4,7 @@
 
 #include "bindings/bindings.hpp"
 #include "bindings/rows.hpp"
+#include "contact/contact_terms.hpp"
 #include "contact/friction.hpp"
 
 namespace qlb {
@@ -64,11 +65,6 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 12, 12>> hessian_blocks(const Barri
 }
 
 void bind_potential(nb::module_& m) {
-  nb::class_<Barrier::Bending> bending(m, "Bending",
-                                       "Terms k a a^T of the Hessian of contacts, besides the normal ones.");
-  property(bending, "nodes", &Barrier::Bending::nodes);
-  property(bending, "vectors", &Barrier::Bending::vectors);
-  property(bending, "stiffness", &Barrier::Bending::stiffness);
   nb::class_<Barrier>(m, "Barrier", "The potential of contact: a barrier, or a penalty where states may intersect.")
       .def(
           "__init__",
@@ -81,6 +77,7 @@ void bind_potential(nb::module_& m) {
             b.limit_pairs(view(keys), view(dhat));
           },
           nb::arg("keys"), nb::arg("dhat"), "Pairs that act only when nearer than a distance of their own.")
+      .def_prop_ro("reach", &Barrier::reach, "Pairs farther apart, or for a penalty deeper inside, do not act [m].")
       .def("evaluate", &evaluate, nb::arg("x"), nb::arg("vertex_faces"), nb::arg("edge_edges"), nb::arg("planes"),
            nb::arg("plane_allowed"), nb::arg("scale"), nb::arg("gradient").noconvert(),
            nb::arg("edge_sign") = nb::none(), ReleaseGil(),
@@ -93,7 +90,8 @@ void bind_potential(nb::module_& m) {
           [](const Barrier& b, const Array<const double>& x, const ContactSet& contacts, double threshold) {
             return b.bending(sized(x, 3 * b.surface().nodes(), "x"), contacts, threshold);
           },
-          nb::arg("x"), nb::arg("contacts"), nb::arg("threshold"), ReleaseGil())
+          nb::arg("x"), nb::arg("contacts"), nb::arg("threshold"), ReleaseGil(),
+          "Terms of the Hessian of contacts besides the normal ones, as far as they stiffen by more than `threshold`.")
       .def("hessian_blocks", &hessian_blocks, nb::arg("x"), nb::arg("contacts"), nb::arg("project"),
            "The Hessian of each contact (size, 12, 12) at the x where `contacts` were found, scaled as they are. "
            "project: to the nearest positive semidefinite matrices.");
@@ -140,12 +138,30 @@ void bind_friction(nb::module_& m) {
           "the gradient of the energy to gradient (n, 3).");
 }
 
+RankOneTerms contact_terms(const ContactSet* contacts, const FrictionTerms* friction, double along,
+                           const std::optional<Array<const double>>& secant, const RankOneTerms* more) {
+  RankOneTerms terms;
+  terms.reserve((contacts != nullptr ? contacts->size() : 0) +
+                (friction != nullptr ? static_cast<std::int64_t>(friction->stiffness.size()) : 0) +
+                (more != nullptr ? more->size() : 0));
+  if (contacts != nullptr) add_normal_terms(*contacts, terms);
+  if (friction != nullptr) add_friction_terms(*friction, along, view_or_none(secant), terms);
+  if (more != nullptr) terms.add(*more);
+  return terms;
+}
+
 }  // namespace
 
 void bind_barrier(nb::module_& m) {
   bind_contact_set(m);
   bind_potential(m);
   bind_friction(m);
+  m.def(
+      "contact_terms", &contact_terms, nb::arg("contacts").none(), nb::arg("friction").none(), nb::arg("along"),
+      nb::arg("secant") = nb::none(), nb::arg("more").none() = nb::none(), ReleaseGil(),
+      "The Hessian of contacts along their normals, then that of friction, two terms each, then `more`. Along its slip "
+      "friction has at least the share `along` of its stiffness across, and at least `secant` (f), no more than "
+      "across.");
 }
 
 }  // namespace qlb

@@ -43,6 +43,7 @@ void bind_contact(nb::module_& m);
 void bind_energies(nb::module_& m);
 void bind_linalg(nb::module_& m);
 void bind_low_rank(nb::module_& m);
+void bind_terms(nb::module_& m);
 void bind_program(nb::module_& m);
 
 }  // namespace qlb

@@ -1,6 +1,6 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/shared_ptr.h>
 
 #include "bindings/bindings.hpp"
 #include "bindings/rows.hpp"
@@ -10,7 +10,6 @@
 #include "linalg/woodbury_inverse.hpp"
 
 namespace qlb {
-namespace {
 
 void bind_terms(nb::module_& m) {
   constexpr auto inside = nb::rv_policy::reference_internal;
@@ -71,29 +70,29 @@ void bind_terms(nb::module_& m) {
           ReleaseGil(), "out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).");
 }
 
-// keys, sliding, nodes, vectors, stiffness
-using TermArrays = std::tuple<Array<const std::int64_t>, Array<const std::int64_t>, Array<const std::int32_t>,
-                              Array<const double>, Array<const double>>;
+namespace {
 
-ContactTerms of_arrays(const TermArrays& arrays) {
-  const auto& [keys, sliding, nodes, vectors, stiffness] = arrays;
-  return {view(keys), view(sliding), view(nodes), view(vectors), view(stiffness)};
-}
+using KeyArray = Array<const std::int64_t>;
 
 void bind_change(nb::module_& m) {
   m.def(
       "contact_change",
-      [](const TermArrays& now, const TermArrays& held, const WoodburyInverse& inverse, double scale, double small,
-         double same, double shifted) {
-        ContactChange change = contact_change(of_arrays(now), of_arrays(held), inverse, {scale, small, same, shifted});
-        return std::pair(std::move(change.terms), change.framed);
+      [](const RankOneTerms& now, const KeyArray& keys, const KeyArray& sliding, const RankOneTerms& held,
+         const KeyArray& held_keys, const KeyArray& held_sliding, const WoodburyInverse& inverse, double scale,
+         double small, double same, double shifted) {
+        ContactChange change =
+            contact_change({view(keys), view(sliding), now}, {view(held_keys), view(held_sliding), held}, inverse,
+                           {scale, small, same, shifted});
+        return std::pair(std::make_shared<RankOneTerms>(std::move(change.terms)), change.framed);
       },
-      nb::arg("now"), nb::arg("held"), nb::arg("inverse"), nb::arg("scale"), nb::arg("small"), nb::arg("same"),
-      nb::arg("shifted"),
-      "What a model needs beside a factor that holds other contacts. now, held: pairs of primitives, of contacts (k) "
-      "and of friction (f), then the terms' nodes (t, 4), vectors (t, 4, 3) and stiffness (t): k along normals, 2 f of "
-      "friction, any others; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes "
-      "beside the factor, after them others in the frame of the factor, and how many of these.");
+      nb::arg("now"), nb::arg("keys"), nb::arg("sliding"), nb::arg("held"), nb::arg("held_keys"),
+      nb::arg("held_sliding"), nb::arg("inverse"), nb::arg("scale"), nb::arg("small"), nb::arg("same"),
+      nb::arg("shifted"), ReleaseGil(),
+      "What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of "
+      "friction, "
+      "any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor. Gives the "
+      "terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and "
+      "how many of these.");
 }
 
 std::shared_ptr<SupernodalCholesky> with_half_solves(const std::shared_ptr<InverseOperator>& factor) {
@@ -106,7 +105,6 @@ std::shared_ptr<SupernodalCholesky> with_half_solves(const std::shared_ptr<Inver
 }  // namespace
 
 void bind_low_rank(nb::module_& m) {
-  bind_terms(m);
   nb::class_<WoodburyInverse, InverseOperator>(
       m, "WoodburyInverse", "An inverse carried along with the material, with rank-one terms added to the matrix.")
       .def(
@@ -124,9 +122,14 @@ void bind_low_rank(nb::module_& m) {
           nb::arg("x"), nb::arg("reference"), nb::arg("weight"), ReleaseGil(),
           "Maps from how the material has moved since the factor was made at `reference`; the terms stay.")
       .def("reset", &WoodburyInverse::reset, ReleaseGil(), "Maps of one; the terms stay.")
-      .def("set_terms", &WoodburyInverse::set_terms, nb::arg("terms"), nb::arg("framed") = 0, ReleaseGil(),
-           "Replaces the terms; the last `framed` of them are in the frame of the factor as they are. False where the "
-           "sum is not positive definite: it then goes on without any.")
+      .def(
+          "set_terms",
+          [](WoodburyInverse& op, std::shared_ptr<RankOneTerms> terms, std::int64_t framed) {
+            return op.set_terms(std::move(terms), framed);
+          },
+          nb::arg("terms"), nb::arg("framed") = 0, ReleaseGil(),
+          "Replaces the terms; the last `framed` of them are in the frame of the factor as they are. False where the "
+          "sum is not positive definite: it then goes on without any.")
       .def(
           "pull_back",
           [](const WoodburyInverse& op, const Array<const std::int32_t>& nodes, const Array<const double>& vectors,

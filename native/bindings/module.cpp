@@ -10,6 +10,7 @@ NB_MODULE(_native, m) {
   using namespace qlb;
   m.doc() = "Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.";
   bind_assembly(m);
+  bind_terms(m);
   bind_contact(m);
   bind_barrier(m);
   bind_candidates(m);

@@ -271,8 +271,10 @@ void Barrier::hessian_blocks(const double* x, const ContactSet& contacts, bool p
   }
 }
 
-Barrier::Bending Barrier::bending(const double* x, const ContactSet& contacts, double threshold) const {
-  Bending found;
+RankOneTerms Barrier::bending(const double* x, const ContactSet& contacts, double threshold) const {
+  RankOneTerms found;
+  std::vector<std::array<double, 12>> vectors;
+  std::vector<double> stiffness;
   for (std::int64_t k = 0; k < contacts.size(); ++k) {
     const ContactKind kind = contacts.kind(k);
     if (kind == ContactKind::plane) continue;
@@ -282,8 +284,10 @@ Barrier::Bending Barrier::bending(const double* x, const ContactSet& contacts, d
     const Mollifier mollifier =
         kind == ContactKind::edge_edge ? edge_mollifier(at, contacts.mollifier_threshold[k]) : Mollifier{};
     const Derivatives f = potential(s.distance, contacts.weight[k], contacts.dhat[k]);
-    const int count = pair_bending(at, s, f, mollifier, threshold, found.vectors, found.stiffness);
-    found.nodes.insert(found.nodes.end(), count, contacts.nodes[k]);
+    vectors.clear();
+    stiffness.clear();
+    const int count = pair_bending(at, s, f, mollifier, threshold, vectors, stiffness);
+    for (int j = 0; j < count; ++j) found.add(contacts.nodes[k], vectors[j], stiffness[j]);
   }
   return found;
 }

@@ -14,6 +14,7 @@
 #include "contact/potentials.hpp"
 #include "contact/separation.hpp"
 #include "contact/surface.hpp"
+#include "linalg/rank_one_terms.hpp"
 
 namespace qlb {
 
@@ -51,13 +52,9 @@ class Barrier {
 
   // What the Hessian of contacts has besides stiffness n n^T, as far as it stiffens by more than `threshold`: the sum
   // of k a a^T over terms.
-  struct Bending {
-    std::vector<std::array<std::int32_t, 4>> nodes;
-    std::vector<std::array<double, 12>> vectors;
-    std::vector<double> stiffness;
-  };
-  Bending bending(const double* x, const ContactSet& contacts, double threshold) const;
+  RankOneTerms bending(const double* x, const ContactSet& contacts, double threshold) const;
 
+  double reach() const { return reach_; }  // a pair farther apart, or inside by more, does not act [m]
   const ContactSurface& surface() const { return *surface_; }
 
  private:

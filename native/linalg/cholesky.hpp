@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "assembly/block_matrix.hpp"
 #include "linalg/rank_one_terms.hpp"
@@ -15,9 +16,10 @@ class InverseOperator {
   virtual ~InverseOperator() = default;
   virtual std::int64_t size() const = 0;
   virtual void apply(const double* b, double* x) = 0;
-  // x = B^-1 (b + C beta) and along = C^T x for the directions C of `terms`. Where they are part of B and stiff, beta
-  // is to be kept apart: its large forces would drown the rest of b.
-  virtual void apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x, double* along);
+  // x = B^-1 (b + C beta) and along = C^T x for the directions C of those of the `terms` that `which` lists. Where they
+  // are part of B and stiff, beta is to be kept apart: its large forces would drown the rest of b.
+  virtual void apply_split(const double* b, const RankOneTerms& terms, std::span<const std::int32_t> which,
+                           const double* beta, double* x, double* along);
 };
 
 // The matrix is that of the free degrees of freedom; vectors are full length, and zero where a node is held.

@@ -76,31 +76,22 @@ class Comparison {
  public:
   Comparison(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse, const Nearness& near)
       : now_(now), held_(held), inverse_(inverse), near_(near), small_(near.small * near.scale) {
-    lacking_.assign(now.stiffness.begin(), now.stiffness.end());
-    change_.resize(held.stiffness.size());
-    std::ranges::transform(held.stiffness, change_.begin(), std::negate<>());
+    lacking_ = now.terms.all_stiffness();
+    change_.resize(held.terms.size());
+    std::ranges::transform(held.terms.all_stiffness(), change_.begin(), std::negate<>());
   }
 
   ContactChange result() {
     for (const auto& [here, there] : in_common(now_.keys, held_.keys)) compare_normals(here, there);
     for (const auto& [here, there] : in_common(now_.sliding, held_.sliding))
       compare_sliding(now_.keys.size() + 2 * here, held_.keys.size() + 2 * there);
-    std::vector<std::int32_t> nodes(now_.nodes.begin(), now_.nodes.end());
-    std::vector<double> vectors(now_.vectors.begin(), now_.vectors.end()), stiffness = std::move(lacking_);
-    std::int64_t framed = std::ssize(turned_stiffness_);
-    for (std::size_t k = 0; k < change_.size(); ++k) {
-      if (std::abs(change_[k]) <= small_) continue;
-      const auto at = held_.nodes.begin() + 4 * k;
-      nodes.insert(nodes.end(), at, at + 4);
-      const auto a = held_.vectors.begin() + 12 * k;
-      vectors.insert(vectors.end(), a, a + 12);
-      stiffness.push_back(change_[k]);
-      ++framed;
-    }
-    nodes.insert(nodes.end(), turned_nodes_.begin(), turned_nodes_.end());
-    vectors.insert(vectors.end(), turned_vectors_.begin(), turned_vectors_.end());
-    stiffness.insert(stiffness.end(), turned_stiffness_.begin(), turned_stiffness_.end());
-    return {RankOneTerms(nodes, vectors, stiffness), framed};
+    RankOneTerms terms = now_.terms;
+    for (std::size_t j = 0; j < lacking_.size(); ++j) terms.set_stiffness(j, lacking_[j]);
+    for (std::size_t k = 0; k < change_.size(); ++k)
+      if (std::abs(change_[k]) > small_) terms.add(held_.terms.nodes(k), held_.terms.all_vectors()[k], change_[k]);
+    terms.add(turned_);
+    const std::int64_t framed = terms.size() - now_.terms.size();
+    return {std::move(terms), framed};
   }
 
  private:
@@ -111,20 +102,16 @@ class Comparison {
   // Of now, in the frame of the factor.
   Vector pulled_back(std::int64_t row) const {
     Vector out;
-    inverse_.pull_back(now_.nodes.subspan(4 * row, 4), now_.vectors.subspan(12 * row, 12), out.data());
+    inverse_.pull_back(now_.terms.nodes(row), now_.terms.all_vectors()[row], out.data());
     return out;
   }
 
-  Vector as_held(std::int64_t row) const {
-    Vector out;
-    std::copy_n(held_.vectors.begin() + 12 * row, 12, out.begin());
-    return out;
-  }
+  const Vector& as_held(std::int64_t row) const { return held_.terms.all_vectors()[row]; }
 
   // Along nearly the same normal only the change counts.
   void compare_normals(std::int64_t here, std::int64_t there) {
-    const double now = now_.stiffness[here], then = held_.stiffness[there];
-    const Vector a = pulled_back(here), b = as_held(there);
+    const double now = now_.terms.stiffness(here), then = held_.terms.stiffness(there);
+    const Vector a = pulled_back(here), &b = as_held(there);
     double turn = 0.0;
     for (int i = 0; i < 12; ++i) turn += (a[i] - b[i]) * (a[i] - b[i]);
     if (!(std::max(now, then) * turn <= 0.5 * near_.scale)) return;
@@ -141,7 +128,8 @@ class Comparison {
     for (int i = 0; i < 4; ++i) shift += (weight[i] - weight_now[i]) * (weight[i] - weight_now[i]);
     if (!(shift <= near_.shifted)) return;
     lacking_[here] = lacking_[here + 1] = change_[there] = change_[there + 1] = 0.0;
-    const Square<3> now = block(a, &now_.stiffness[here], at), then = block(b, &held_.stiffness[there], at);
+    const Square<3> now = block(a, &now_.terms.all_stiffness()[here], at);
+    const Square<3> then = block(b, &held_.terms.all_stiffness()[there], at);
     Square<3> difference, axes;
     double most = 0.0;
     for (int i = 0; i < 3; ++i)
@@ -154,11 +142,7 @@ class Comparison {
   }
 
   void add_turned(std::int64_t there, const Weights& weight, const std::array<double, 3>& axis, double stiffness) {
-    for (int i = 0; i < 4; ++i) {
-      turned_nodes_.push_back(held_.nodes[4 * there + i]);
-      for (const double v : axis) turned_vectors_.push_back(weight[i] * v);
-    }
-    turned_stiffness_.push_back(stiffness);
+    turned_.add(held_.terms.nodes(there), weight, axis, stiffness);
   }
 
   const ContactTerms &now_, &held_;
@@ -166,15 +150,12 @@ class Comparison {
   Nearness near_;
   double small_;
   std::vector<double> lacking_, change_;  // beside the factor: of the terms of now, of those that it holds
-  std::vector<std::int32_t> turned_nodes_;
-  std::vector<double> turned_vectors_, turned_stiffness_;  // of friction, by eigenvectors
+  RankOneTerms turned_;                   // of friction, by eigenvectors
 };
 
 void check(const ContactTerms& terms, const char* name) {
-  const std::size_t count = terms.stiffness.size();
-  if (terms.nodes.size() != 4 * count || terms.vectors.size() != 12 * count ||
-      terms.keys.size() + 2 * terms.sliding.size() > count)
-    throw std::invalid_argument(std::string(name) + ": keys, nodes, vectors and stiffness differ in size");
+  if (std::ssize(terms.keys) + 2 * std::ssize(terms.sliding) > terms.terms.size())
+    throw std::invalid_argument(std::string(name) + ": fewer terms than keys and sliding say");
 }
 
 }  // namespace

@@ -12,8 +12,7 @@ namespace qlb {
 // A sum of k a a^T: of contacts along their normals, then of friction, two a contact, then any others.
 struct ContactTerms {
   std::span<const std::int64_t> keys, sliding;  // pairs of primitives, each once: of contacts, and of friction
-  std::span<const std::int32_t> nodes;          // (count, 4)
-  std::span<const double> vectors, stiffness;   // (count, 4, 3), (count)
+  const RankOneTerms& terms;
 };
 
 // What is near enough: stiffness within a factor `same`, or on both sides below `small`; normals that turn by less than

@@ -78,4 +78,18 @@ void subtract3(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t
                   rest);
 }
 
+// out = the sum of 3 count rows of doubles, `ld` apart by three, each times its weight; length in whole vectors.
+template <class V>
+void combine3(const double* const* rows, std::int64_t ld, const double* w, int count, std::int64_t length,
+              double* out) {
+  using D = xsimd::batch<double, typename V::arch_type>;
+  for (std::int64_t i = 0; i < length; i += kLanes<D>) {
+    D sum(0.0);
+    for (int k = 0; k < count; ++k)
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) sum = xsimd::fma(D(w[3 * k + c]), D::load_unaligned(rows[k] + c * ld + i), sum);
+    sum.store_unaligned(out + i);
+  }
+}
+
 }  // namespace qlb::dense

@@ -5,6 +5,7 @@
 #include "linalg/dense_columns.hpp"
 #include "linalg/dense_front.hpp"
 #include "linalg/dense_solve.hpp"
+#include "linalg/dense_vectors.hpp"
 #include "simd/arch.hpp"
 
 namespace qlb {
@@ -24,7 +25,10 @@ const DenseKernels<T>* make_dense_kernels(const char* level) {
                                           dense::backward_own<V, T>,
                                           dense::gram3<V, T>,
                                           dense::dots3<V, T>,
-                                          dense::subtract3<V, T>};
+                                          dense::subtract3<V, T>,
+                                          dense::combine3<V>,
+                                          dense::dot<V, T>,
+                                          dense::add_scaled<V, T>};
   return &kernels;
 }
 

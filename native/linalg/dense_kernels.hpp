@@ -55,6 +55,13 @@ struct DenseKernels {
   void (*gram3)(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g);
   void (*dots3)(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t);
   void (*subtract3)(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t rows);
+  // out (length, a multiple of kPadding) = the sum of 3 count rows, each times its weight in w (count, 3): rows[k],
+  // rows[k] + ld and rows[k] + 2 ld.
+  void (*combine3)(const double* const* rows, std::int64_t ld, const double* w, int count, std::int64_t length,
+                   double* out);
+
+  T (*dot)(const T* a, const T* b, std::int64_t n);
+  void (*add_scaled)(T scale, const T* a, T* b, std::int64_t n);  // b += scale a
 };
 
 // The best level that runs here, or the one named. Throws std::invalid_argument.

@@ -4,13 +4,12 @@
 
 namespace qlb {
 
-void InverseOperator::apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x,
-                                  double* along) {
-  const std::int64_t count = terms.size();
+void InverseOperator::apply_split(const double* b, const RankOneTerms& terms, std::span<const std::int32_t> which,
+                                  const double* beta, double* x, double* along) {
   std::vector<double> whole(b, b + size());
-  terms.add_combination({beta, static_cast<std::size_t>(count)}, whole.data());
+  for (std::size_t k = 0; k < which.size(); ++k) terms.add_to(which[k], beta[k], whole.data());
   apply(whole.data(), x);
-  for (std::int64_t j = 0; j < count; ++j) along[j] = terms.dot(j, x);
+  for (std::size_t k = 0; k < which.size(); ++k) along[k] = terms.dot(which[k], x);
 }
 
 }  // namespace qlb

@@ -36,36 +36,45 @@ bool Lbfgs::push(const double* x_old, const double* x, const double* g_old, cons
   return true;
 }
 
-void Lbfgs::take_terms(const RankOneTerms& terms, std::span<const double> known) {
+void Lbfgs::choose_terms(const RankOneTerms& terms, std::span<const double> known, std::span<const double> beta) {
   terms.check_nodes(size_ / 3);
-  const std::int64_t count = terms.size();
+  which_.clear();
+  known_.clear();
+  beta_.clear();
+  for (std::int64_t j = 0; j < terms.size(); ++j) {
+    const double stiffness = known[j], force = beta.empty() ? 0.0 : beta[j];
+    if (stiffness < 0.0)
+      throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " + std::to_string(stiffness) +
+                                  ", expected at least 0");
+    if (stiffness == 0.0 && force == 0.0) continue;
+    which_.push_back(static_cast<std::int32_t>(j));
+    known_.push_back(stiffness);
+    beta_.push_back(force);
+  }
+}
+
+void Lbfgs::join_terms(const RankOneTerms& terms) {
+  const auto count = static_cast<std::int64_t>(which_.size());
   with_terms_.resize(count_);
   along_s_.resize(count_ * count);
   change_.resize(count_ * count);
   for (int k = 0; k < count_; ++k) {
     with_terms_[k] = curvature_[slot(k)];
     for (std::int64_t j = 0; j < count; ++j) {
-      const double along = terms.dot(j, s(k));
-      const double stiffness = known.empty() ? terms.stiffness(j) : known[j];
+      const double along = terms.dot(which_[j], s(k));
       along_s_[k * count + j] = along;
-      change_[k * count + j] = stiffness * along;
-      with_terms_[k] += stiffness * along * along;
+      change_[k * count + j] = known_[j] * along;
+      with_terms_[k] += known_[j] * along * along;
     }
   }
 }
 
 double Lbfgs::direction_with(const double* g, std::span<const double> beta, InverseOperator& inner,
                              const RankOneTerms& terms, double* p, std::span<const double> known) {
-  const std::int64_t count = terms.size();
-  for (std::int64_t j = 0; j < count; ++j) {
-    const double stiffness = known.empty() ? terms.stiffness(j) : known[j];
-    if (stiffness < 0.0)
-      throw std::invalid_argument("stiffness of term " + std::to_string(j) + " is " + std::to_string(stiffness) +
-                                  ", expected at least 0");
-  }
-  take_terms(terms, known);
-  beta_.assign(count, 0.0);
-  std::ranges::copy(beta, beta_.begin());
+  choose_terms(terms, known.empty() ? terms.all_stiffness() : known, beta);
+  join_terms(terms);
+  const auto count = static_cast<std::int64_t>(which_.size());
+  forces_ = beta_;
   along_.resize(count);
   const auto few_dot = [&](const double* a, const double* b) { return std::inner_product(a, a + count, b, 0.0); };
   const auto few_add = [&](double scale, const double* a, std::vector<double>& to) {
@@ -82,7 +91,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
   if (count == 0)
     inner.apply(work_.data(), p);
   else
-    inner.apply_split(work_.data(), terms, beta_.data(), p, along_.data());
+    inner.apply_split(work_.data(), terms, which_, beta_.data(), p, along_.data());
   for (int k = 0; k < count_; ++k) {
     const double *along = along_s_.data() + k * count, *change = change_.data() + k * count;
     const double weight = alpha_[k] - (dot(y(k), p, size_, threads_) + few_dot(change, along_.data())) / with_terms_[k];
@@ -91,7 +100,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
   }
   for (std::int64_t k = 0; k < size_; ++k) p[k] = -p[k];
   double slope = dot(g, p, size_, threads_);
-  for (std::size_t j = 0; j < beta.size(); ++j) slope -= beta[j] * along_[j];
+  for (std::int64_t j = 0; j < count; ++j) slope -= forces_[j] * along_[j];
   return slope;
 }
 

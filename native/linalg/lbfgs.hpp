@@ -38,13 +38,17 @@ class Lbfgs {
   // k = 0 is the oldest pair; one slot more than the window, where a new pair waits to be judged.
   std::int64_t slot(int k) const { return (first_ + k) % (window_ + 1); }
 
-  void take_terms(const RankOneTerms& terms, std::span<const double> known);
+  // Which terms play a part, with their stiffness in the pairs and their beta; then what the pairs have along them.
+  void choose_terms(const RankOneTerms& terms, std::span<const double> known, std::span<const double> beta);
+  void join_terms(const RankOneTerms& terms);
   std::int64_t size_;
   int window_, threads_;
   int first_ = 0, count_ = 0;
   Aligned<double> pairs_;  // (window + 1, 2, size)
   std::vector<double> curvature_, alpha_;
   std::vector<double> with_terms_;        // s.y' of each pair
+  std::vector<std::int32_t> which_;       // terms that play a part: of them are all that follow
+  std::vector<double> known_, forces_;    // stiffness in the pairs, and beta as given
   std::vector<double> along_s_, change_;  // (pairs, terms): a_j.s, stiffness_j a_j.s
   std::vector<double> beta_, along_;      // of what is worked on: coefficients of C, and C^T p
   Aligned<double> work_;

@@ -147,7 +147,8 @@ void NodeColumns<T>::make_gram(std::int32_t i, std::int32_t j) {
 template <class T>
 void NodeColumns<T>::reserve_gram() {
   if (count() <= capacity_) return;
-  const std::int64_t capacity = std::max({std::int64_t{32}, count(), capacity_ + capacity_ / 2}), ld = 3 * capacity_;
+  const std::int64_t wanted = std::max({std::int64_t{32}, count(), capacity_ + capacity_ / 2});
+  const std::int64_t capacity = (wanted + kPadding - 1) / kPadding * kPadding, ld = 3 * capacity_;
   Aligned<double> gram(9 * capacity * capacity, kNotMade);
   for (std::int64_t k = 0; k < ld; ++k) std::copy_n(gram_.data() + k * ld, ld, gram.data() + k * 3 * capacity);
   gram_ = std::move(gram);
@@ -173,6 +174,15 @@ void NodeColumns<T>::join(std::span<const std::int32_t> columns) {
   }
   std::fill(joined_.begin(), joined_.end(), 0);
   for (const std::int32_t k : ids) joined_[k] = 1;
+}
+
+template <class T>
+void NodeColumns<T>::gram_product(const std::int32_t* columns, const double* u, int few, double* out) const {
+  const double* rows[4];
+  for (int k = 0; k < few; ++k) rows[k] = gram_row(columns[k], 0);
+  // Whole vectors, so that a column's entries are summed in one way wherever it stands.
+  const std::int64_t length = (3 * count() + kPadding - 1) / kPadding * kPadding;
+  factor_.kernels().combine3(rows, gram_length(), u, few, length, out);
 }
 
 template <class T>

@@ -31,10 +31,10 @@ class NodeColumns {
   std::int64_t first_row(std::int32_t column) const { return columns_[column].first; }
   std::int64_t count() const { return static_cast<std::int64_t>(columns_.size()); }
   std::int64_t bytes() const;
-  // Row d of the blocks G_ij, j = 0, 1, ...: 3 count() entries.
-  const double* gram_row(std::int32_t i, int d) const {
-    return gram_.data() + (3 * std::int64_t{i} + d) * 3 * capacity_;
-  }
+  // out_j = the sum of G_ji u_i over `few` (<= 4) columns i, u (few, 3), for all columns j: 3 per column, in room for
+  // gram_length(). What stands there for columns that were not joined does not matter.
+  void gram_product(const std::int32_t* columns, const double* u, int few, double* out) const;
+  std::int64_t gram_length() const { return 3 * capacity_; }
 
   void dots(std::span<const std::int32_t> columns, const T* y, double* t) const;      // t_k = Z^T y, each 3
   void subtract(std::span<const std::int32_t> columns, const double* c, T* y) const;  // y -= sum_k Z c_k
@@ -60,6 +60,10 @@ class NodeColumns {
   std::int64_t common_rows(const Column& a, const Column& b) const;
   void make_gram(std::int32_t i, std::int32_t j);
   void reserve_gram();
+  // Row d of the blocks G_ij, j = 0, 1, ...
+  const double* gram_row(std::int32_t i, int d) const {
+    return gram_.data() + (3 * std::int64_t{i} + d) * gram_length();
+  }
 
   const Supernodes& supernodes_;
   const SupernodalFactor<T>& factor_;

@@ -61,6 +61,34 @@ RankOneTerms::RankOneTerms(std::span<const std::int32_t> nodes, std::span<const 
   for (std::size_t j = 0; j < stiffness.size(); ++j) std::copy_n(vectors.begin() + 12 * j, 12, vector_[j].begin());
 }
 
+void RankOneTerms::reserve(std::int64_t count) {
+  nodes_.reserve(count);
+  vector_.reserve(count);
+  stiffness_.reserve(count);
+}
+
+void RankOneTerms::add(const std::array<std::int32_t, 4>& nodes, const std::array<double, 12>& vector,
+                       double stiffness) {
+  nodes_.push_back(nodes);
+  vector_.push_back(vector);
+  stiffness_.push_back(stiffness);
+  last_node_ = std::max(last_node_, *std::ranges::max_element(nodes));
+}
+
+void RankOneTerms::add(const std::array<std::int32_t, 4>& nodes, const std::array<double, 4>& gamma,
+                       const std::array<double, 3>& axis, double stiffness) {
+  std::array<double, 12> vector;
+  for (int k = 0; k < 12; ++k) vector[k] = gamma[k / 3] * axis[k % 3];
+  add(nodes, vector, stiffness);
+}
+
+void RankOneTerms::add(const RankOneTerms& others) {
+  nodes_.insert(nodes_.end(), others.nodes_.begin(), others.nodes_.end());
+  vector_.insert(vector_.end(), others.vector_.begin(), others.vector_.end());
+  stiffness_.insert(stiffness_.end(), others.stiffness_.begin(), others.stiffness_.end());
+  last_node_ = std::max(last_node_, others.last_node_);
+}
+
 void RankOneTerms::check_nodes(std::int64_t nodes) const {
   if (last_node_ >= nodes)
     throw std::invalid_argument("a term has node " + std::to_string(last_node_) + ", outside [0, " +
@@ -76,18 +104,19 @@ double RankOneTerms::dot(std::int64_t j, const double* v) const {
   return sum;
 }
 
-void RankOneTerms::add(std::int64_t j, double scale, double* out) const {
+void RankOneTerms::add_to(std::int64_t j, double scale, double* out) const {
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < 3; ++c) out[3 * static_cast<std::int64_t>(nodes_[j][i]) + c] += scale * vector_[j][3 * i + c];
 }
 
 void RankOneTerms::add_product(const double* v, double* out, double scale, std::span<const double> stiffness) const {
   for (std::int64_t j = 0; j < size(); ++j)
-    if (stiffness[j] != 0.0) add(j, scale * stiffness[j] * dot(j, v), out);
+    if (stiffness[j] != 0.0) add_to(j, scale * stiffness[j] * dot(j, v), out);
 }
 
 void RankOneTerms::add_combination(std::span<const double> beta, double* out) const {
-  for (std::int64_t j = 0; j < size(); ++j) add(j, beta[j], out);
+  for (std::int64_t j = 0; j < size(); ++j)
+    if (beta[j] != 0.0) add_to(j, beta[j], out);
 }
 
 }  // namespace qlb

@@ -20,6 +20,14 @@ class RankOneTerms {
   RankOneTerms(std::span<const std::int32_t> nodes, std::span<const double> vectors, std::span<const double> stiffness);
   RankOneTerms() = default;
 
+  void reserve(std::int64_t count);
+  void add(const std::array<std::int32_t, 4>& nodes, const std::array<double, 12>& vector, double stiffness);
+  // gamma (x) axis
+  void add(const std::array<std::int32_t, 4>& nodes, const std::array<double, 4>& gamma,
+           const std::array<double, 3>& axis, double stiffness);
+  void add(const RankOneTerms& others);
+  void set_stiffness(std::int64_t j, double stiffness) { stiffness_[j] = stiffness; }
+
   std::int64_t size() const { return static_cast<std::int64_t>(stiffness_.size()); }
   const std::array<std::int32_t, 4>& nodes(std::int64_t j) const { return nodes_[j]; }
   // a_j at its node i
@@ -35,7 +43,7 @@ class RankOneTerms {
   void check_nodes(std::int64_t nodes) const;
 
   double dot(std::int64_t j, const double* v) const;                      // a_j . v, v (nodes, 3)
-  void add(std::int64_t j, double scale, double* out) const;              // out += scale a_j
+  void add_to(std::int64_t j, double scale, double* out) const;           // out += scale a_j
   void add_combination(std::span<const double> beta, double* out) const;  // out += C beta
   // out += scale C K C^T v, K of `stiffness`
   void add_product(const double* v, double* out, double scale, std::span<const double> stiffness) const;

@@ -3,32 +3,46 @@
 #include <algorithm>
 #include <vector>
 
+#include "linalg/dense_kernels.hpp"
+
 namespace qlb {
 namespace {
-constexpr std::int64_t kGroup = 8192;  // entries summed together: the grouping never depends on the threads
+
+// Entries worked on together: the grouping, and so every sum, is the same for any number of threads.
+constexpr std::int64_t kGroup = 8192;
+
+const DenseKernels<double>& kernels() {
+  static const DenseKernels<double>& found = find_dense_kernels<double>();
+  return found;
 }
+
+}  // namespace
 
 double dot(const double* a, const double* b, std::int64_t n, int threads) {
   const std::int64_t groups = (n + kGroup - 1) / kGroup;
-  thread_local std::vector<double> storage;
-  storage.assign(groups, 0.0);
-  double* partial = storage.data();
-#pragma omp parallel for schedule(static) num_threads(threads) if (groups > 4)
-  for (std::int64_t g = 0; g < groups; ++g) {
-    double sum = 0.0;
-    const std::int64_t last = std::min(n, (g + 1) * kGroup);
-#pragma omp simd reduction(+ : sum)
-    for (std::int64_t k = g * kGroup; k < last; ++k) sum += a[k] * b[k];
-    partial[g] = sum;
-  }
+  const auto of_group = [&, dot = kernels().dot](std::int64_t g) {
+    return dot(a + g * kGroup, b + g * kGroup, std::min(kGroup, n - g * kGroup));
+  };
   double total = 0.0;
+  if (threads == 1 || groups <= 4) {
+    for (std::int64_t g = 0; g < groups; ++g) total += of_group(g);
+    return total;
+  }
+  thread_local std::vector<double> storage;
+  storage.resize(groups);
+  double* partial = storage.data();
+#pragma omp parallel for schedule(static) num_threads(threads)
+  for (std::int64_t g = 0; g < groups; ++g) partial[g] = of_group(g);
   for (std::int64_t g = 0; g < groups; ++g) total += partial[g];
   return total;
 }
 
 void add_scaled(double scale, const double* a, double* b, std::int64_t n, int threads) {
-#pragma omp parallel for simd schedule(static) num_threads(threads) if (n > 4 * kGroup)
-  for (std::int64_t k = 0; k < n; ++k) b[k] += scale * a[k];
+  const std::int64_t groups = (n + kGroup - 1) / kGroup;
+  const auto add = kernels().add_scaled;
+#pragma omp parallel for schedule(static) num_threads(threads) if (groups > 4 && threads > 1)
+  for (std::int64_t g = 0; g < groups; ++g)
+    add(scale, a + g * kGroup, b + g * kGroup, std::min(kGroup, n - g * kGroup));
 }
 
 }  // namespace qlb

@@ -8,11 +8,15 @@
 namespace qlb {
 namespace {
 constexpr std::array<double, 3> kZero{};
-}
+const std::shared_ptr<const RankOneTerms> kNoTerms = std::make_shared<RankOneTerms>();
+}  // namespace
 
 WoodburyInverse::WoodburyInverse(std::shared_ptr<SupernodalCholesky> factor, std::shared_ptr<const TetBlocks> blocks,
                                  std::span<const std::uint8_t> fixed, int threads)
-    : factor_(std::move(factor)), frame_(std::move(blocks), fixed, threads), threads_(std::max(threads, 1)) {
+    : factor_(std::move(factor)),
+      frame_(std::move(blocks), fixed, threads),
+      threads_(std::max(threads, 1)),
+      terms_(kNoTerms) {
   if (3 * frame_.nodes() != size()) throw std::invalid_argument("the mesh and the factor differ in size");
   right_.resize(size());
   solution_.resize(size());
@@ -33,7 +37,7 @@ void WoodburyInverse::reset() {
 void WoodburyInverse::forget() {
   columns_ = std::monostate();
   version_ = -1;
-  terms_ = {};
+  terms_ = kNoTerms;
   active_.clear();
   used_.clear();
 }
@@ -60,9 +64,9 @@ std::int64_t WoodburyInverse::bytes() const {
       columns_);
 }
 
-bool WoodburyInverse::set_terms(RankOneTerms terms, std::int64_t framed) {
-  terms.check_nodes(frame_.nodes());
-  if (framed < 0 || framed > terms.size())
+bool WoodburyInverse::set_terms(std::shared_ptr<const RankOneTerms> terms, std::int64_t framed) {
+  terms->check_nodes(frame_.nodes());
+  if (framed < 0 || framed > terms->size())
     throw std::invalid_argument("framed is " + std::to_string(framed) + ", must be 0 to the number of terms");
   factor_->check_ready();
   terms_ = std::move(terms);
@@ -84,7 +88,7 @@ bool WoodburyInverse::express_terms() {
   const bool good =
       factor_->visit_factor([&]<class T>(const SupernodalFactor<T>&) { return express(columns_of<T>()); });
   if (!good) {
-    terms_ = {};
+    terms_ = kNoTerms;
     active_.clear();
   }
   return good;
@@ -103,14 +107,14 @@ NodeColumns<T>& WoodburyInverse::columns_of() {
 template <class T>
 bool WoodburyInverse::express(NodeColumns<T>& columns) {
   std::vector<std::int32_t> nodes;
-  for (std::int64_t j = 0; j < terms_.size(); ++j)
+  for (std::int64_t j = 0; j < terms_->size(); ++j)
     for (int i = 0; i < 4; ++i)
-      if (terms_.stiffness(j) != 0.0 && terms_.vector(j, i) != kZero) nodes.push_back(terms_.nodes(j)[i]);
+      if (terms_->stiffness(j) != 0.0 && terms_->vector(j, i) != kZero) nodes.push_back(terms_->nodes(j)[i]);
   columns.make(nodes);
 
   active_.clear();
   used_.clear();
-  for (std::int64_t j = 0; j < terms_.size(); ++j)
+  for (std::int64_t j = 0; j < terms_->size(); ++j)
     if (const Active term = in_frame(columns, j); term.count > 0) {
       active_.push_back(term);
       used_.insert(used_.end(), term.column, term.column + term.count);
@@ -137,16 +141,17 @@ template <class T>
 auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) const -> Active {
   Active term;
   term.term = j;
-  term.positive = terms_.stiffness(j) > 0.0;
-  const double root = std::sqrt(std::abs(terms_.stiffness(j)));
+  term.positive = terms_->stiffness(j) > 0.0;
+  const double root = std::sqrt(std::abs(terms_->stiffness(j)));
   term.root = root;
   if (root == 0.0) return term;
   for (int i = 0; i < 4; ++i) {
-    const std::int32_t node = terms_.nodes(j)[i];
-    if (terms_.vector(j, i) == kZero || columns.held(node)) continue;
+    const std::int32_t node = terms_->nodes(j)[i];
+    if (terms_->vector(j, i) == kZero || columns.held(node)) continue;
     const std::int32_t column = columns.find(node);
-    const bool framed = j >= terms_.size() - framed_;
-    const std::array<double, 3> vector = framed ? terms_.vector(j, i) : frame_.pull_back_at(node, terms_.vector(j, i));
+    const bool framed = j >= terms_->size() - framed_;
+    const std::array<double, 3> vector =
+        framed ? terms_->vector(j, i) : frame_.pull_back_at(node, terms_->vector(j, i));
     const auto end = term.column + term.count;
     const auto at = std::find(term.column, end, column) - term.column;
     if (at == term.count) {
@@ -161,20 +166,14 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
 // S_jl = sign_j delta_jl + sum over the nodes a of j and b of l of u_ja^T G_ab u_lb: for each l first all of G u_l.
 template <class T>
 void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
-  const std::int64_t count = active_terms(), length = 3 * columns.count();
+  const std::int64_t count = active_terms();
 #pragma omp parallel num_threads(threads_) if (threads_ > 1 && count > 32)
   {
-    std::vector<double> product(length);
+    std::vector<double> product(columns.gram_length());
 #pragma omp for schedule(dynamic, 4)
     for (std::int64_t l = 0; l < count; ++l) {
-      std::fill(product.begin(), product.end(), 0.0);
-      double* to = product.data();
-      for (int i = 0; i < active_[l].count; ++i) {
-        const double *u = active_[l].u[i], *g0 = columns.gram_row(active_[l].column[i], 0);
-        const double *g1 = columns.gram_row(active_[l].column[i], 1), *g2 = columns.gram_row(active_[l].column[i], 2);
-#pragma omp simd
-        for (std::int64_t k = 0; k < length; ++k) to[k] += u[0] * g0[k] + u[1] * g1[k] + u[2] * g2[k];
-      }
+      const double* to = product.data();
+      columns.gram_product(active_[l].column, active_[l].u[0], active_[l].count, product.data());
       double* S = small_.column(l);
       for (std::int64_t j = l; j < count; ++j) {
         double sum = 0.0;
@@ -231,23 +230,32 @@ void WoodburyInverse::apply(const double* b, double* x) {
   solve(b, nullptr, x);
 }
 
-void WoodburyInverse::apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x,
-                                  double* along) {
-  if (terms.size() != terms_.size()) throw std::invalid_argument("the terms are not those that were set");
+void WoodburyInverse::apply_split(const double* b, const RankOneTerms& terms, std::span<const std::int32_t> which,
+                                  const double* beta, double* x, double* along) {
+  if (terms.size() != terms_->size()) throw std::invalid_argument("the terms are not those that were set");
   // What is not in the small matrix has no stiffness (or no free node): its part of b is as small as any.
-  std::vector<char> kept(terms.size(), 0);
-  for (const Active& active : active_) kept[active.term] = 1;
+  active_of_.assign(terms.size(), -1);
+  for (std::size_t k = 0; k < active_.size(); ++k) active_of_[active_[k].term] = static_cast<std::int32_t>(k);
+  beta_.assign(terms.size(), 0.0);
   split_.assign(b, b + size());
-  for (std::int64_t j = 0; j < terms.size(); ++j)
-    if (!kept[j] && beta[j] != 0.0) terms.add(j, beta[j], split_.data());
-  solve(split_.data(), beta, x);
-  for (std::int64_t j = 0; j < terms.size(); ++j)
-    if (!kept[j]) along[j] = terms.dot(j, x);
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const std::int32_t j = which[k];
+    if (active_of_[j] >= 0)
+      beta_[j] = beta[k];
+    else if (beta[k] != 0.0)
+      terms.add_to(j, beta[k], split_.data());
+  }
+  solve(split_.data(), beta_.data(), x);
   // W^T (y - W c) = sign (|K|^-1/2 beta + c)
-  for (std::size_t k = 0; k < active_.size(); ++k) {
-    const Active& active = active_[k];
-    const double scaled = beta[active.term] / active.root + term_products_[k];
-    along[active.term] = (active.positive ? scaled : -scaled) / active.root;
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const std::int32_t j = which[k];
+    if (active_of_[j] < 0) {
+      along[k] = terms.dot(j, x);
+      continue;
+    }
+    const Active& active = active_[active_of_[j]];
+    const double scaled = beta[k] / active.root + term_products_[active_of_[j]];
+    along[k] = (active.positive ? scaled : -scaled) / active.root;
   }
 }
 

@@ -33,7 +33,7 @@ class WoodburyInverse : public InverseOperator {
   // Replaces the terms; negative ones take away. The last `framed` of them are in the frame of the factor as they are.
   // Returns false, and goes on without any, where the sum is not positive definite: with negative terms alone can that
   // be.
-  bool set_terms(RankOneTerms terms, std::int64_t framed = 0);
+  bool set_terms(std::shared_ptr<const RankOneTerms> terms, std::int64_t framed = 0);
   // T_i^T a_i at the nodes of each term, a of shape (terms, 4, 3).
   void pull_back(std::span<const std::int32_t> nodes, std::span<const double> vectors, double* out) const;
   // Drops the terms and all that was kept: for when the factor is made anew.
@@ -43,9 +43,10 @@ class WoodburyInverse : public InverseOperator {
   void apply(const double* b, double* x) override;
   // `terms` are those that were set. With W and S as above, S^-1 (W^T y - sign |K|^-1/2 beta) takes the place of
   // S^-1 W^T y, so that stiff terms cancel nothing.
-  void apply_split(const double* b, const RankOneTerms& terms, const double* beta, double* x, double* along) override;
+  void apply_split(const double* b, const RankOneTerms& terms, std::span<const std::int32_t> which, const double* beta,
+                   double* x, double* along) override;
 
-  std::int64_t terms() const { return terms_.size(); }
+  std::int64_t terms() const { return terms_->size(); }
   std::int64_t active_terms() const { return static_cast<std::int64_t>(active_.size()); }  // those not wholly held
   std::int64_t columns() const;  // nodes whose half-solves are kept
   std::int64_t bytes() const;    // that they and their products take
@@ -80,12 +81,13 @@ class WoodburyInverse : public InverseOperator {
   int threads_;
   AnyColumns columns_;
   std::int64_t version_ = -1;  // of the factor that the columns belong to
-  RankOneTerms terms_;
+  std::shared_ptr<const RankOneTerms> terms_;
   std::int64_t framed_ = 0;         // how many of the last terms are in the frame of the factor
   std::vector<Active> active_;      // the positive ones first
   std::vector<std::int32_t> used_;  // columns in use, in elimination order
   DenseCholesky small_;
-  std::vector<double> node_products_, term_products_;
+  std::vector<double> node_products_, term_products_, beta_;
+  std::vector<std::int32_t> active_of_;  // of each term: its place in active_, or -1
   Aligned<double> right_, solution_, split_;
 };
 

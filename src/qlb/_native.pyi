@@ -56,6 +56,43 @@ class BlockMatrix:
 
     def multiply(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None: ...
 
+class RankOneTerms:
+    """
+    A sum of matrices stiffness a a^T, a with a vector at each node of a term.
+    """
+
+    @overload
+    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], axis: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
+        """
+        a = gamma (x) axis: shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.
+        """
+
+    @overload
+    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], vectors: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
+        """Shapes (k, 4), (k, 4, 3), (k,)."""
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
+
+    @property
+    def vectors(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4, 3), writable=False)]: ...
+
+    @property
+    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
+
+    def __len__(self) -> int: ...
+
+    def add_combination(self, beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
+        """out += C beta, shapes (k,) and (n, 3)."""
+
+    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0, stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None:
+        """
+        out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).
+        """
+
 class ContactSurface:
     """The triangles that may touch, and which bodies may touch which."""
 
@@ -73,6 +110,11 @@ class ContactSurface:
     def node_area(self, node: int) -> float: ...
 
     def edge_area(self, edge: int) -> float: ...
+
+def plane_bound(vertices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], offsets: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], near: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], p: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], motion: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], share: float) -> tuple[float, int, int]:
+    """
+    The largest part of a step p (n, 3) [m] from x, at most 1, that takes no more than `share` of any gap between vertices (v) and planes, normals (q, 3), offsets (q), that hold them out (near (v, q)) and whose offsets grow by motion (q) [m] at the same time; and the node and the plane that bound it, -1 where none does.
+    """
 
 class ContactSet:
     """
@@ -117,18 +159,6 @@ class ContactSet:
     @property
     def groups(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]: ...
 
-class Bending:
-    """Terms k a a^T of the Hessian of contacts, besides the normal ones."""
-
-    @property
-    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
-
-    @property
-    def vectors(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12), writable=False)]: ...
-
-    @property
-    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
-
 class Barrier:
     """
     The potential of contact: a barrier, or a penalty where states may intersect.
@@ -139,12 +169,19 @@ class Barrier:
     def limit_pairs(self, keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], dhat: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
         """Pairs that act only when nearer than a distance of their own."""
 
+    @property
+    def reach(self) -> float:
+        """Pairs farther apart, or for a penalty deeper inside, do not act [m]."""
+
     def evaluate(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], vertex_faces: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], edge_edges: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], planes: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], plane_allowed: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], edge_sign: Annotated[NDArray[numpy.int8], dict(order='C', device='cpu', writable=False)] | None = None) -> ContactSet:
         """
         The contacts at x (n, 3) [m] among the pairs vertex_faces (k, 2) [node, face] and edge_edges (l, 2) and between all vertices and the planes (q, 4) [unit normal, offset] that hold out their groups (plane_allowed (q, groups)). Adds scale times the gradient of the energy to gradient (n, 3). edge_sign (l) int8, for a penalty: -1 where two edges have passed through each other.
         """
 
-    def bending(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, threshold: float) -> Bending: ...
+    def bending(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, threshold: float) -> RankOneTerms:
+        """
+        Terms of the Hessian of contacts besides the normal ones, as far as they stiffen by more than `threshold`.
+        """
 
     def hessian_blocks(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], contacts: ContactSet, project: bool) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 12, 12))]:
         """
@@ -189,6 +226,11 @@ class Friction:
         """
         The friction of slips from x_base to x (n, 3) [m]; below the slip epsilon [m] it holds. Adds scale times the gradient of the energy to gradient (n, 3).
         """
+
+def contact_terms(contacts: ContactSet | None, friction: FrictionTerms | None, along: float, secant: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None, more: RankOneTerms | None = None) -> RankOneTerms:
+    """
+    The Hessian of contacts along their normals, then that of friction, two terms each, then `more`. Along its slip friction has at least the share `along` of its stiffness across, and at least `secant` (f), no more than across.
+    """
 
 class Candidates:
     """
@@ -405,43 +447,6 @@ class Lbfgs:
 
 def dot(a: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], b: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int) -> float: ...
 
-class RankOneTerms:
-    """
-    A sum of matrices stiffness a a^T, a with a vector at each node of a term.
-    """
-
-    @overload
-    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], gamma: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], axis: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
-        """
-        a = gamma (x) axis: shapes (k, 4), (k, 4), (k, 3), (k,). A node that a term repeats adds up.
-        """
-
-    @overload
-    def __init__(self, nodes: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], vectors: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> None:
-        """Shapes (k, 4), (k, 4, 3), (k,)."""
-
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def nodes(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]: ...
-
-    @property
-    def vectors(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, 4, 3), writable=False)]: ...
-
-    @property
-    def stiffness(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]: ...
-
-    def __len__(self) -> int: ...
-
-    def add_combination(self, beta: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> None:
-        """out += C beta, shapes (k,) and (n, 3)."""
-
-    def add_product(self, v: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')], scale: float = 1.0, stiffness: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)] | None = None) -> None:
-        """
-        out += scale C K C^T v, both of shape (n, 3); K their own stiffness, or one given (k,).
-        """
-
 class WoodburyInverse(InverseOperator):
     """
     An inverse carried along with the material, with rank-one terms added to the matrix.
@@ -487,9 +492,9 @@ class WoodburyInverse(InverseOperator):
     def bytes(self) -> int:
         """Memory of the half-solves and their products."""
 
-def contact_change(now: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], held: tuple[Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
+def contact_change(now: RankOneTerms, keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held: RankOneTerms, held_keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held_sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
     """
-    What a model needs beside a factor that holds other contacts. now, held: pairs of primitives, of contacts (k) and of friction (f), then the terms' nodes (t, 4), vectors (t, 4, 3) and stiffness (t): k along normals, 2 f of friction, any others; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
+    What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
     """
 
 def simd_levels() -> list[str]:

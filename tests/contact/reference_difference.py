@@ -6,19 +6,28 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import BoolArray, IntArray
-from qlb.contact.stage import ContactPoint, Terms, joined
+from qlb.contact.stage import ContactPoint
 from qlb.solvers.contact_base import SAME, SHIFTED, SMALL, ContactBase
 from tests.support import Array
 
+Terms = tuple[IntArray, Array, Array]
+"""A sum of k a a^T: nodes (t, 4), a at each of them (t, 4, 3), and k (t,)."""
+
+
+def arrays(terms: _native.RankOneTerms) -> Terms:
+    """Its parts."""
+    return terms.nodes, terms.vectors, terms.stiffness
+
 
 def reference_difference(
-    base: ContactBase, contact: ContactPoint, terms: Terms, inverse: _native.WoodburyInverse, scale: float
+    base: ContactBase, contact: ContactPoint, inverse: _native.WoodburyInverse, scale: float
 ) -> tuple[Array, Terms]:
-    """The stiffness of each of `terms` beside the factor, and the terms in the frame of the factor."""
-    lacking, change = terms[2].copy(), -base.terms[2]
+    """The stiffness of each term of `contact` beside the factor, and the terms in the frame of the factor."""
+    terms, then_terms = arrays(contact.terms()), arrays(base.terms)
+    lacking, change = terms[2].copy(), -then_terms[2]
     _, here, there = np.intersect1d(contact.contacts.key, base.keys, return_indices=True)
-    now, then = terms[2][here], base.terms[2][there]
-    turn = _pulled_back(inverse, terms[0][here], terms[1][here]) - base.terms[1][there]
+    now, then = terms[2][here], then_terms[2][there]
+    turn = _pulled_back(inverse, terms[0][here], terms[1][here]) - then_terms[1][there]
     parallel = np.maximum(now, then) * np.sum(turn**2, axis=(1, 2)) <= 0.5 * scale
     lacking[here[parallel]] = 0.0
     change[there[parallel]] = np.where(_alike(now, then, scale), 0.0, now - then)[parallel]
@@ -26,7 +35,7 @@ def reference_difference(
     _, here, there = np.intersect1d(contact.sliding_keys, base.sliding, return_indices=True)
     rows = (contact.count + 2 * here)[:, None] + [0, 1]
     base_rows = (len(base.keys) + 2 * there)[:, None] + [0, 1]
-    nodes, old, held = (part[base_rows] for part in base.terms)
+    nodes, old, held = (part[base_rows] for part in then_terms)
     new = _pulled_back(inverse, terms[0][rows], terms[1][rows])
     at = np.argmax(np.sum(old[:, 0] ** 2, axis=2), axis=1)
     weight = _weights(old[:, 0], at)
@@ -41,8 +50,10 @@ def reference_difference(
 
     change[np.abs(change) <= SMALL * scale] = 0.0
     kept = np.flatnonzero(change)
-    others = base.terms[0][kept], base.terms[1][kept], change[kept]
-    return lacking, joined(others, (nodes[k[c], 0], vectors, sizes[c, a]))
+    others = then_terms[0][kept], then_terms[1][kept], change[kept]
+    turned = nodes[k[c], 0], vectors, sizes[c, a]
+    beside = [np.concatenate(parts) for parts in zip(others, turned, strict=True)]
+    return lacking, (beside[0], beside[1], beside[2])
 
 
 def _pulled_back(inverse: _native.WoodburyInverse, nodes: IntArray, vectors: Array) -> Array:

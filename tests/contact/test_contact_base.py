@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from qlb import Contact, Plane, Simulation, _native
-from qlb.contact.stage import ContactPoint, StageContact, Terms
+from qlb.contact.stage import ALONG, ContactPoint, StageContact
 from qlb.integrators.integrator import Origin, Stage
 from qlb.solvers import QLA
 from qlb.solvers.contact_base import ContactBase
 from qlb.timing import Timer
-from tests.contact.reference_difference import reference_difference
+from tests.contact.reference_difference import Terms, arrays, reference_difference
 from tests.contact.scenes import SOFT, UP, block, simulate
 from tests.support import Array
 
@@ -27,8 +27,8 @@ def resting() -> Simulation:
     return simulate(block(material=SOFT), Plane((0, -0.05 - DHAT / 2, 0), UP), solver="QLA", contact=contact)
 
 
-def dense(terms: Terms, count: int) -> Array:
-    nodes, vectors, stiffness = terms
+def dense(terms: Terms | _native.RankOneTerms, count: int) -> Array:
+    nodes, vectors, stiffness = arrays(terms) if isinstance(terms, _native.RankOneTerms) else terms
     columns = np.zeros((len(nodes), count, 3))
     for slot in range(4):
         columns[np.arange(len(nodes)), nodes[:, slot]] += vectors[:, slot]
@@ -52,6 +52,26 @@ def moved(simulation: Simulation, rng: np.random.Generator) -> tuple[ContactPoin
     return at(simulation, after, x), at(simulation, x, x + rng.uniform(-1e-5, 1e-5, size=x.shape)), x
 
 
+def test_the_terms_are_those_of_the_contacts_and_then_two_for_each_that_slides(rng):
+    _, point, _ = moved(resting(), rng)
+    friction, secant = point.friction, rng.uniform(-1, 2, size=len(point.sliding_keys))
+    assert friction is not None
+    secant *= friction.stiffness[1::2]
+    normal = point.contacts.gamma[:, :, None] * point.contacts.normal[:, None, :]
+    turning = friction.gamma[:, :, None] * friction.axis[:, None, :]
+    along = np.maximum(friction.stiffness[::2], ALONG * friction.stiffness[1::2])
+    stiffness = friction.stiffness.copy()
+    stiffness[::2] = np.maximum(along, np.minimum(secant, stiffness[1::2]))
+    assert not np.array_equal(stiffness[::2], along)
+    found = replace(point, secant=secant).terms(point.sliding_terms())
+    kept = slice(0, found.size - friction.stiffness.size)
+    np.testing.assert_array_equal(found.nodes[kept], np.concatenate([point.contacts.nodes, friction.nodes]))
+    np.testing.assert_array_equal(found.vectors[kept], np.concatenate([normal, turning]))
+    np.testing.assert_array_equal(found.stiffness[kept], np.concatenate([point.contacts.stiffness, stiffness]))
+    np.testing.assert_array_equal(found.vectors[kept.stop :], turning)
+    np.testing.assert_array_equal(found.stiffness[kept.stop :: 2], along)
+
+
 @pytest.mark.parametrize("held", [1.0, 0.5])
 def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(held, monkeypatch, rng):
     monkeypatch.setattr("qlb.solvers.contact_base.SAME", 1.0)
@@ -59,9 +79,9 @@ def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(hel
     simulation = resting()
     now, then, x = moved(simulation, rng)
     assert 0 < now.count < then.count
-    base = ContactBase.of(then, rng.random(len(then.terms()[2])) < held)
+    base = ContactBase.of(then, rng.random(len(then.terms().stiffness)) < held)
     terms, _ = base.difference(now, now.terms(), simulation.solver.inverse, 1.0)
-    found = dense(base.held, len(x)) + dense((terms.nodes, terms.vectors, terms.stiffness), len(x))
+    found = dense(base.held, len(x)) + dense(terms, len(x))
     wanted = dense(now.terms(), len(x))
     np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
 
@@ -69,17 +89,17 @@ def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(hel
 def test_by_default_the_model_is_near_enough_along_every_direction(rng):
     simulation = resting()
     now, then, x = moved(simulation, rng)
-    scale = 0.05 * then.terms()[2].max()
-    base = ContactBase.of(then, np.ones(len(then.terms()[2]), dtype=bool))
+    scale = 0.05 * then.terms().stiffness.max()
+    base = ContactBase.of(then, np.ones(len(then.terms().stiffness), dtype=bool))
     terms, _ = base.difference(now, now.terms(), simulation.solver.inverse, scale)
     own = scale * np.eye(3 * len(x))  # stands for the bodies
-    found = dense(base.held, len(x)) + dense((terms.nodes, terms.vectors, terms.stiffness), len(x))
+    found = dense(base.held, len(x)) + dense(terms, len(x))
     model, wanted = own + found, own + dense(now.terms(), len(x))
     factor = np.linalg.inv(np.linalg.cholesky(model))
     spread = np.linalg.eigvalsh(factor @ wanted @ factor.T)
     assert spread.min() > 0.45
     assert spread.max() < 2.2
-    assert np.count_nonzero(terms.stiffness) < len(then.terms()[2])
+    assert np.count_nonzero(terms.stiffness) < len(then.terms().stiffness)
 
 
 @pytest.mark.parametrize("softness", [1e-3, 0.05, 1.0])
@@ -87,11 +107,11 @@ def test_what_differs_is_what_numpy_finds(softness, rng):
     """In a frame that has turned, by the dense sums of all terms beside the factor."""
     simulation = resting()
     now, then, x = moved(simulation, rng)
-    base = ContactBase.of(then, rng.random(len(then.terms()[2])) < 0.8)
-    inverse, scale = simulation.solver.inverse, softness * then.terms()[2].max()
+    base = ContactBase.of(then, rng.random(len(then.terms().stiffness)) < 0.8)
+    inverse, scale = simulation.solver.inverse, softness * then.terms().stiffness.max()
     inverse.carry(x @ (np.eye(3) + rng.uniform(-0.02, 0.02, size=(3, 3))), x, 0.0)
     terms, framed = base.difference(now, now.terms(), inverse, scale)
-    lacking, change = reference_difference(base, now, now.terms(), inverse, scale)
+    lacking, change = reference_difference(base, now, inverse, scale)
     np.testing.assert_array_equal(terms.stiffness[: len(lacking)], lacking)
     assert framed == len(change[2])
     assert framed > 0
@@ -103,11 +123,11 @@ def test_what_differs_is_what_numpy_finds(softness, rng):
 
 def test_a_saved_base_comes_back(rng):
     _, then, _ = moved(resting(), rng)
-    base = ContactBase.of(then, np.ones(len(then.terms()[2]), dtype=bool))
+    base = ContactBase.of(then, np.ones(len(then.terms().stiffness), dtype=bool))
     again = ContactBase.load(base.save())
     np.testing.assert_array_equal(again.keys, base.keys)
     np.testing.assert_array_equal(again.sliding, base.sliding)
-    for part, expected in zip(again.terms, base.terms, strict=True):
+    for part, expected in zip(arrays(again.terms), arrays(base.terms), strict=True):
         np.testing.assert_array_equal(part, expected)
 
 
@@ -119,11 +139,11 @@ def test_friction_that_a_step_has_turned_round_holds_along_its_slip():
     stage = Stage(STEP, STEP, ((1.0, x),), np.zeros_like(x))
     contact = StageContact(model, stage, STEP**2, Origin(x, STEP), Timer())
     before, turned, further = (contact.at(x + part * slip) for part in (1, -1, 2))
-    across = turned.sliding_terms()[2][1::2]
-    assert (turned.sliding_terms()[2][::2] < 0.3 * across).all()
-    np.testing.assert_allclose(turned.after(before).sliding_terms()[2][::2], across)
+    across = turned.sliding_terms().stiffness[1::2]
+    assert (turned.sliding_terms().stiffness[::2] < 0.3 * across).all()
+    np.testing.assert_allclose(turned.after(before).sliding_terms().stiffness[::2], across)
     for point in (further.after(before), turned.after(replace(before, friction=None))):
-        assert (point.sliding_terms()[2][::2] < 0.3 * point.sliding_terms()[2][1::2]).all()
+        assert (point.sliding_terms().stiffness[::2] < 0.3 * point.sliding_terms().stiffness[1::2]).all()
 
 
 def extended(solver: QLA, node: int) -> str:

@@ -153,8 +153,8 @@ def test_settings_out_of_range_are_named(wrong):
 
 
 def test_penalty_mode_does_not_refuse_a_start_that_intersects():
-    a, b = block(CUBE, name="a"), block(CUBE, (0.18, 0.05, 0.02), name="b")
+    a, b = block(CUBE, name="a"), block(CUBE, (0.197, 0.05, 0.02), name="b")
     simulation = simulate([a, b], contact=Contact(mode="penalty"), gravity=(0, 0, 0))
     gap = [r.positions[simulation.nodes_of(1), 0].mean() - r.positions[simulation.nodes_of(0), 0].mean()
            for r in simulation.run(5)]  # fmt: skip
-    assert np.isfinite(gap).all()
+    assert min(gap) > 0.197

@@ -17,7 +17,7 @@ class Curve:
     def __init__(self, value: Callable[[float], float], derivative: Callable[[float], float]) -> None:
         self.value, self.derivative, self.energy_rounding = value, derivative, 0.0
 
-    def evaluate(self, x: Array) -> Evaluation:
+    def evaluate(self, x: Array, *, on_way: bool = False) -> Evaluation:
         gradient = np.array([self.derivative(float(x[0]))])
         return Evaluation(self.value(float(x[0])), gradient, gradient, None)
 

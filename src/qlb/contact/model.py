@@ -75,7 +75,8 @@ class ContactModel:
         vertices = self.surface.vertices
         self.vertices: IntArray = vertices[around.groups[vertices] < around.bodies]
         """surface nodes of bodies"""
-        self._near_planes = self.plane_allowed[:, around.groups[self.vertices]].T != 0
+        self.near_planes = np.ascontiguousarray(self.plane_allowed[:, around.groups[self.vertices]].T)
+        """whether each of `vertices` is held out by each plane, shape (v, q)"""
         if self.is_barrier:
             self._limit_features()
 
@@ -109,7 +110,7 @@ class ContactModel:
     def plane_gaps(self, x: FloatArray, offsets: FloatArray) -> FloatArray:
         """Distances [m] of `vertices` from each plane, shape (v, q); infinite where they may not touch."""
         gaps = (x @ self.normals.T)[self.vertices] - offsets
-        return np.where(self._near_planes, gaps, np.inf)
+        return np.where(self.near_planes != 0, gaps, np.inf)
 
     def plane_of(self, contacts: _native.ContactSet) -> IntArray:
         """The plane of each contact, or a negative number for one between two surfaces, shape (k,)."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from qlb import _native
-from qlb.arrays import FloatArray, IntArray, LongArray
+from qlb.arrays import FloatArray, LongArray
 from qlb.contact.friction import LaggedFriction
 from qlb.contact.model import ContactModel
 from qlb.contact.report import ContactForces
@@ -17,17 +17,7 @@ from qlb.timing import Timer
 
 PLANE_SHARE = 0.9  # of the way to a plane that a step may go
 ALONG = 0.2  # of friction's stiffness across the sliding, what its model has along it at least
-MARGIN = 0.25  # of dhat, by which candidates outlast the motion that they were searched for
-
-
-Terms = tuple[IntArray, FloatArray, FloatArray]
-"""A sum of k a a^T: nodes (t, 4), a at each of them (t, 4, 3), and k (t,)."""
-
-
-def joined(*sums: Terms) -> Terms:
-    """All sums as one."""
-    nodes, vectors, stiffness = (np.concatenate(parts) for parts in zip(*sums, strict=True))
-    return nodes, vectors, stiffness
+MARGIN = 0.5  # of dhat, by which candidates outlast the motion that they were searched for
 
 
 @dataclass(frozen=True)
@@ -46,27 +36,18 @@ class ContactPoint:
     secant: FloatArray | None = None
     """by how much each friction has grown along the change of its slip since the point before, over that change (f,)"""
 
-    def terms(self, *more: Terms) -> Terms:
+    def terms(self, more: _native.RankOneTerms | None = None) -> _native.RankOneTerms:
         """The Hessian along the normals, then that of friction, as a sum of k a a^T; and `more` after them."""
-        c = self.contacts
-        normal = c.nodes, c.gamma[:, :, None] * c.normal[:, None, :], c.stiffness
-        friction = () if self.friction is None else (self.sliding_terms(),)
-        return joined(normal, *friction, *more)
+        return _native.contact_terms(self.contacts, self.friction, ALONG, self.secant, more)
 
-    def sliding_terms(self) -> Terms:
+    def sliding_terms(self) -> _native.RankOneTerms:
         """The Hessian of friction, two terms a contact that was lagged.
 
         Its stiffness is mu lambda f1(u)/u across the sliding u, and at least a part of that along it, where the Hessian
         has nothing once a contact slides: with all of it the quadratic would lie above its potential, with nothing a
         step that turns u round goes too far. And at least what the last step has shown, where it turned u round.
         """
-        f = self.friction
-        assert f is not None
-        stiffness = f.stiffness.copy()
-        stiffness[::2] = np.maximum(f.stiffness[::2], ALONG * f.stiffness[1::2])
-        if self.secant is not None:
-            stiffness[::2] = np.maximum(stiffness[::2], np.minimum(self.secant, f.stiffness[1::2]))
-        return f.nodes, f.gamma[:, :, None] * f.axis[:, None, :], stiffness
+        return _native.contact_terms(None, self.friction, ALONG, self.secant)
 
     def after(self, before: ContactPoint) -> ContactPoint:
         """The same, with what the step from the point `before` tells of friction lagged at the same point."""
@@ -128,20 +109,22 @@ class StageContact:
         """Take normal forces and directions of sliding from `contacts`."""
         self._friction = LaggedFriction(self.model, contacts, self._scale, self._plane_motion())
 
-    def at(self, x: FloatArray) -> ContactPoint:
-        """Contact at positions `x` (n, 3) [m]."""
+    def at(self, x: FloatArray, *, on_way: bool = False) -> ContactPoint:
+        """Contact at positions `x` (n, 3) [m]; `on_way`: on the last way given to `bound`, up to that."""
         model = self.model
-        self.cover(x, None)
+        if not (on_way and model.is_barrier):
+            self.cover(x, None)
         with self._timer.section("contact"):
-            gradient = np.zeros_like(x)
+            gradient = np.zeros(x.shape)
             contacts = model.evaluate(x, self._offsets, self._scale, gradient)
             friction = None if self._friction is None else self._friction.whole
             if self._friction is None or friction is None:
                 return ContactPoint(contacts.energy, gradient, contacts)
-            sliding = np.zeros_like(x)
+            sliding = np.zeros(x.shape)
             terms = self._slide(friction, x, sliding)
+            gradient += sliding
             keys = self._friction.keys
-            return ContactPoint(contacts.energy + terms.energy, gradient + sliding, contacts, terms, sliding, keys)
+            return ContactPoint(contacts.energy + terms.energy, gradient, contacts, terms, sliding, keys)
 
     def forces(self, x: FloatArray, point: ContactPoint) -> ContactForces:
         """Forces at positions `x` (n, 3) [m], where contact was found to be `point`."""
@@ -162,12 +145,12 @@ class StageContact:
         return friction.evaluate(x, self._stage.x_b, epsilon, self._scale, gradient)
 
     def cover(self, x: FloatArray, p: FloatArray | None) -> None:
-        """See to it that the candidates hold every pair that may come within dhat of each other on x -> x + p."""
-        candidates, dhat = self.model.candidates, self.model.dhat
+        """See to it that the candidates hold every pair that may act somewhere on the way x -> x + p."""
+        candidates = self.model.candidates
         p = self._still if p is None else p
         with self._timer.section("candidates"):
             if self.model.stale or not candidates.covers(x, p):
-                candidates.build(x, p, MARGIN * dhat, dhat)
+                candidates.build(x, p, MARGIN * self.model.dhat, self.model.barrier.reach)
                 self.model.stale = False
 
     def bound(self, x: FloatArray, p: FloatArray, *, moving_planes: bool = False) -> float:
@@ -199,21 +182,12 @@ class StageContact:
         return ", ".join(dict.fromkeys(model.describe(int(node)) for node in nodes))
 
     def _plane_bound(self, x: FloatArray, p: FloatArray, moving_planes: bool) -> float:
-        model, self._at_plane = self.model, None
-        gaps = model.plane_gaps(x, self._offsets)
-        if gaps.size == 0:
-            return 1.0
-        closing = -(p @ model.normals.T)[model.vertices]
-        if moving_planes:
-            closing = closing + (self._to - self._offsets)
-        most = PLANE_SHARE * gaps
-        too_far = closing > most
-        if not too_far.any():
-            return 1.0
-        parts = np.divide(most, closing, out=np.ones_like(gaps), where=too_far)
-        v, q = np.unravel_index(np.argmin(parts), parts.shape)
-        self._at_plane = int(model.vertices[v]), int(q)
-        return float(parts[v, q])
+        model = self.model
+        motion = self._to - self._offsets if moving_planes else np.zeros(len(self._offsets))
+        planes = model.vertices, model.normals, self._offsets, model.near_planes
+        part, node, plane = _native.plane_bound(*planes, x, p, motion, PLANE_SHARE)
+        self._at_plane = None if plane < 0 else (node, plane)
+        return part
 
     def _plane_motion(self) -> FloatArray:
         """How far the planes move over c [m], shape (q, 3)."""

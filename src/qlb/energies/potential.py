@@ -38,11 +38,14 @@ class DeadLoad:
 
     def __init__(self, forces: FloatArray, rest: FloatArray, threads: int) -> None:
         self._forces, self._threads = forces, threads
+        self._scaled = 1.0, forces
         self._at_rest = _native.dot(forces, rest, threads)
 
     def add_value_gradient(self, x: FloatArray, scale: float, gradient: FloatArray, /) -> float:
         """Forces f (n, 3) [N] act against the gradient."""
-        gradient -= scale * self._forces
+        if self._scaled[0] != scale:
+            self._scaled = scale, scale * self._forces
+        gradient -= self._scaled[1]
         return scale * (self._at_rest - _native.dot(self._forces, x, self._threads))
 
     def add_hessian(self, x: FloatArray, scale: float, project: bool, matrix: _native.BlockMatrix, /) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, Terms
+from qlb.contact.stage import ContactPoint
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.contact_base import SMALL, ContactBase
 from qlb.solvers.line_search import Point
@@ -149,12 +149,12 @@ class QLA(FactoredLbfgs):
             assert self._low_rank is not None
             self._low_rank.set_terms(terms)
         known = np.zeros(terms.size)
-        known[: len(given[2])] = given[2]
+        known[: given.size] = given.stiffness
         known[contact.count : contact.count + 2 * len(contact.sliding_keys)] = 0.0
         return terms, known
 
     def _beside_factor(
-        self, problem: StageProblem, contact: ContactPoint, given: Terms, most: float = inf
+        self, problem: StageProblem, contact: ContactPoint, given: _native.RankOneTerms, most: float = inf
     ) -> tuple[_native.RankOneTerms, bool]:
         """Terms by which contact differs from what the factor holds; whether they are in place beside it.
 
@@ -183,7 +183,7 @@ class QLA(FactoredLbfgs):
         if old.contact is None:
             self.history.push(old.x, new.x, old.smooth, new.smooth)
         else:
-            y = _secant_gradient(new) - _secant_gradient(old)
+            y = new.secant - old.secant
             self.history.push(old.x, new.x, self._zeros, self._damped(problem, old, new.x - old.x, y))
         self._iterations += 1
         if limited:
@@ -295,11 +295,11 @@ class QLA(FactoredLbfgs):
         self._stale = False
         self._mark(point)
 
-    def _take_in(self, contact: ContactPoint, scale: float) -> Terms:
+    def _take_in(self, contact: ContactPoint, scale: float) -> _native.RankOneTerms:
         """What of the contacts of the moment goes into the factor that is about to be made."""
-        nodes, _, stiffness = contact.terms()
-        fits = self.factor.fits(nodes)
-        if np.count_nonzero(stiffness[~fits] > SMALL * scale) > OUTSIDE:
+        terms = contact.terms()
+        fits = self.factor.fits(terms.nodes)
+        if np.count_nonzero(terms.stiffness[~fits] > SMALL * scale) > OUTSIDE:
             fits[:] = True
         self._base = ContactBase.of(contact, fits)
         return self._base.held
@@ -326,13 +326,6 @@ def _split(
     rest = point.gradient.copy()
     terms.add_combination(forces, rest)
     return problem.system.clear_held(rest), forces
-
-
-def _secant_gradient(point: Point) -> FloatArray:
-    """The gradient that pairs hold the change of: without contact, but with friction."""
-    if point.contact is None or point.contact.sliding is None:
-        return point.smooth
-    return point.smooth + point.contact.sliding
 
 
 def _no_terms() -> _native.RankOneTerms:

@@ -8,7 +8,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, LongArray
-from qlb.contact.stage import ContactPoint, Terms
+from qlb.contact.stage import ContactPoint
 
 PARTS = ("keys", "sliding", "nodes", "vectors", "stiffness")
 
@@ -29,36 +29,37 @@ class ContactBase:
     """of contacts"""
     sliding: LongArray
     """of the contacts that friction is of"""
-    terms: Terms
+    terms: _native.RankOneTerms
     """in the frame of the factor; k = 0 for those that it does not hold"""
 
     @staticmethod
     def of(contact: ContactPoint, held: BoolArray) -> ContactBase:
         """Those of the terms at a point that are `held` (t,)."""
-        nodes, vectors, stiffness = contact.terms()
-        terms = nodes, vectors, np.where(held, stiffness, 0.0)
+        all = contact.terms()
+        terms = _native.RankOneTerms(all.nodes, all.vectors, np.where(held, all.stiffness, 0.0))
         return ContactBase(contact.contacts.key.copy(), contact.sliding_keys.copy(), terms)
 
     @property
-    def held(self) -> Terms:
+    def held(self) -> _native.RankOneTerms:
         """The terms that the factor holds."""
-        rows = np.flatnonzero(self.terms[2])
-        return self.terms[0][rows], self.terms[1][rows], self.terms[2][rows]
+        terms, rows = self.terms, np.flatnonzero(self.terms.stiffness)
+        return _native.RankOneTerms(terms.nodes[rows], terms.vectors[rows], terms.stiffness[rows])
 
     def save(self) -> dict[str, FloatArray]:
         """As arrays of floats."""
-        parts = (self.keys.view(np.float64), self.sliding.view(np.float64), *self.terms)
+        terms = self.terms.nodes, self.terms.vectors, self.terms.stiffness
+        parts = (self.keys.view(np.float64), self.sliding.view(np.float64), *terms)
         return {f"base_{name}": np.asarray(part, dtype=np.float64) for name, part in zip(PARTS, parts, strict=True)}
 
     @staticmethod
     def load(arrays: dict[str, FloatArray]) -> ContactBase:
         """From what `save` gave."""
         keys, sliding, nodes, vectors, stiffness = (arrays[f"base_{name}"] for name in PARTS)
-        terms = nodes.astype(np.int32), vectors, stiffness
+        terms = _native.RankOneTerms(nodes.astype(np.int32), vectors, stiffness)
         return ContactBase(keys.view(np.int64), sliding.view(np.int64), terms)
 
     def difference(
-        self, contact: ContactPoint, terms: Terms, inverse: _native.WoodburyInverse, scale: float
+        self, contact: ContactPoint, terms: _native.RankOneTerms, inverse: _native.WoodburyInverse, scale: float
     ) -> tuple[_native.RankOneTerms, int]:
         """What a model needs beside the factor.
 
@@ -76,5 +77,5 @@ class ContactBase:
             and after them these others, negative where the factor has too much; and how many these are. They are in
             the frame of the factor.
         """
-        now, held = (contact.contacts.key, contact.sliding_keys, *terms), (self.keys, self.sliding, *self.terms)
-        return _native.contact_change(now, held, inverse, scale, SMALL, SAME, SHIFTED)
+        now, held = (terms, contact.contacts.key, contact.sliding_keys), (self.terms, self.keys, self.sliding)
+        return _native.contact_change(*now, *held, inverse, scale, SMALL, SAME, SHIFTED)

@@ -6,7 +6,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, IntArray
-from qlb.contact.stage import ContactPoint, Terms
+from qlb.contact.stage import ContactPoint
 from qlb.system import System
 from qlb.system.system import CholeskyKind, Precision
 
@@ -36,7 +36,7 @@ class ContactMatrix:
         self._scripted = (system.held.fixed != 0).all(axis=1)
 
     def assemble(
-        self, elastic: _native.BlockMatrix, contact: ContactPoint | Terms, x: FloatArray
+        self, elastic: _native.BlockMatrix, contact: ContactPoint | _native.RankOneTerms, x: FloatArray
     ) -> _native.BlockMatrix:
         """`elastic` plus the projected Hessian of `contact` at `x` (n, 3) [m], or given terms; belongs to this object.
 
@@ -49,17 +49,19 @@ class ContactMatrix:
         self._matrix.add_stencils(nodes, blocks)
         return self._matrix
 
-    def _stencil_blocks(self, contact: ContactPoint | Terms, x: FloatArray) -> tuple[IntArray, FloatArray]:
+    def _stencil_blocks(
+        self, contact: ContactPoint | _native.RankOneTerms, x: FloatArray
+    ) -> tuple[IntArray, FloatArray]:
         """Stencils (k, 4) and their blocks (k, 12, 12)."""
-        if isinstance(contact, tuple):
-            return contact[0], _blocks(contact[1], contact[2])
+        if isinstance(contact, _native.RankOneTerms):
+            return contact.nodes, _blocks(contact)
         model = self._system.contact
         assert model is not None
         nodes, blocks = contact.contacts.nodes, model.barrier.hessian_blocks(x, contact.contacts, True)
         if contact.friction is None:  # else of contacts that were, which need not be contacts now
             return nodes, blocks
-        sliding_nodes, *sliding = contact.sliding_terms()
-        return np.concatenate([nodes, sliding_nodes]), np.concatenate([blocks, _blocks(*sliding)])
+        sliding = contact.sliding_terms()
+        return np.concatenate([nodes, sliding.nodes]), np.concatenate([blocks, _blocks(sliding)])
 
     def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
         """Stencils in which nodes that are wholly scripted give way to another of the stencil, with nothing in it."""
@@ -105,10 +107,10 @@ class ContactMatrix:
         self._matrix = _native.BlockMatrix(self._pattern)
 
 
-def _blocks(vectors: FloatArray, stiffness: FloatArray) -> FloatArray:
-    """stiffness a a^T of each term, a of shape (k, 4, 3); shape (k, 12, 12)."""
-    a = vectors.reshape(-1, 12)
-    return np.asarray(stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
+def _blocks(terms: _native.RankOneTerms) -> FloatArray:
+    """Each term as a matrix, shape (k, 12, 12)."""
+    a = terms.vectors.reshape(-1, 12)
+    return np.asarray(terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
 
 
 def _keys(pattern: _native.BlockPattern) -> np.ndarray:

@@ -170,8 +170,9 @@ class Descent(ABC):
         while True:
             p, slope = self.direction(problem, point)
             if np.isfinite(slope) and slope < 0:
-                small = self._is_small(problem, point, p)
-                longest = _longest_step(problem, point.x, p)
+                reach = 0.0 if problem.contact is None else max(float(p.max()), -float(p.min()))
+                small = self._is_small(problem, point, reach)
+                longest = _longest_step(problem, point.x, p, reach)
                 found = backtrack(problem, point, p, slope, longest)
                 if found is not None:
                     return _Found(*found, longest, small)
@@ -180,11 +181,11 @@ class Descent(ABC):
             if not self.recover(problem, point):
                 return Reason.LINE_SEARCH_FAILED
 
-    def _is_small(self, problem: StageProblem, point: Point, p: FloatArray) -> bool:
-        """Whether something touches, and a direction p (n, 3) [m] is so short beside dhat that it may end the solve."""
+    def _is_small(self, problem: StageProblem, point: Point, reach: float) -> bool:
+        """Whether something touches, and a |p|_inf of `reach` [m] is so short beside dhat that it may end the solve."""
         if problem.contact is None or point.contact is None or point.contact.count == 0:
             return False
-        return _reach(p) <= self.tolerance.step * problem.contact.model.dhat
+        return reach <= self.tolerance.step * problem.contact.model.dhat
 
     @property
     def factorizations(self) -> int:
@@ -226,16 +227,14 @@ def _is_settled(problem: StageProblem, point: Point, reference: float) -> bool:
     return point.residual <= SETTLED * max(reference, contact)
 
 
-def _reach(p: FloatArray) -> float:
-    """|p|_inf [m]."""
-    return float(np.abs(p).max())
+def _longest_step(problem: StageProblem, x: FloatArray, p: FloatArray, reach: float) -> float:
+    """The part of p (n, 3) [m] that contact allows and that is no longer than anything may move; 1 without contact.
 
-
-def _longest_step(problem: StageProblem, x: FloatArray, p: FloatArray) -> float:
-    """The part of p (n, 3) [m] that contact allows and that is no longer than anything may move; 1 without contact."""
+    `reach`: |p|_inf [m].
+    """
     if problem.contact is None:
         return 1.0
-    clamp = min(1.0, problem.plausible_move / _reach(p))
+    clamp = min(1.0, problem.plausible_move / reach)
     return clamp * problem.contact.bound(x, p if clamp == 1 else clamp * p)
 
 
@@ -251,15 +250,10 @@ class _Log:
         solver, contact = self._solver, self._problem.contact
         made, self._tried = solver.factorizations - self._tried, solver.factorizations
         seconds = self._problem.timer.lap()
-        row = IterationRow(len(self.rows), point.residual, point.energy, step_length, made, seconds)
-        if contact is not None and point.contact is not None:
-            row = replace(
-                row,
-                contacts=point.contact.count,
-                minimum_distance=point.contact.minimum_distance,
-                step_bound=longest,
-                columns=solver.columns,
-                friction_pass=contact.friction_pass,
-            )
-        self.rows.append(row)
+        row = (len(self.rows), point.residual, point.energy, step_length, made, seconds)
+        if contact is None or point.contact is None:
+            self.rows.append(IterationRow(*row))
+        else:
+            touching = point.contact.count, point.contact.minimum_distance
+            self.rows.append(IterationRow(*row, *touching, longest, solver.columns, contact.friction_pass))
         self.point = point

@@ -8,7 +8,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import BoolArray, FloatArray, IntArray
-from qlb.contact.stage import ContactPoint, Terms
+from qlb.contact.stage import ContactPoint
 from qlb.errors import InputError
 from qlb.solvers.contact_matrix import ContactMatrix
 from qlb.solvers.settings import Projection
@@ -39,7 +39,11 @@ class Factor:
         """Whether the factor in place is of the projected Hessian."""
 
     def update(
-        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | Terms | None = None
+        self,
+        problem: StageProblem,
+        x: FloatArray,
+        projection: Projection,
+        contact: ContactPoint | _native.RankOneTerms | None = None,
     ) -> None:
         """Factorise the Hessian at `x`, with that of `contact` there where it is given.
 
@@ -65,7 +69,11 @@ class Factor:
         raise HessianNotFinite("the Hessian has entries that are not finite")
 
     def _try(
-        self, problem: StageProblem, x: FloatArray, projection: Projection, contact: ContactPoint | Terms | None
+        self,
+        problem: StageProblem,
+        x: FloatArray,
+        projection: Projection,
+        contact: ContactPoint | _native.RankOneTerms | None,
     ) -> bool:
         """The Hessians at `x` that `projection` allows, one after the other."""
         for project in {"always": [True], "on-demand": [False, True], "never": [False]}[projection]:
@@ -84,7 +92,9 @@ class Factor:
         self.raised = True
         return True
 
-    def _factorise(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | Terms | None) -> bool:
+    def _factorise(
+        self, problem: StageProblem, x: FloatArray, contact: ContactPoint | _native.RankOneTerms | None
+    ) -> bool:
         matrix = self._matrix
         if contact is not None:
             matrix = self._add_contact(problem, x, contact)
@@ -92,7 +102,9 @@ class Factor:
             self.count += 1
             return self.cholesky.factorise(matrix) < 0
 
-    def _add_contact(self, problem: StageProblem, x: FloatArray, contact: ContactPoint | Terms) -> _native.BlockMatrix:
+    def _add_contact(
+        self, problem: StageProblem, x: FloatArray, contact: ContactPoint | _native.RankOneTerms
+    ) -> _native.BlockMatrix:
         with problem.timer.section("contact"):
             matrix = self._contact_matrix().assemble(self._matrix, contact, x)
             self.cholesky = self._contact_matrix().cholesky
@@ -123,7 +135,9 @@ class Factor:
         """A copy of the blocks (b, 3, 3) that the factor in place is of."""
         return self._matrix.values.copy()
 
-    def restore(self, values: FloatArray, *, projected: bool, raised: bool, contact: Terms | None = None) -> None:
+    def restore(
+        self, values: FloatArray, *, projected: bool, raised: bool, contact: _native.RankOneTerms | None = None
+    ) -> None:
         """Factorise what `matrix_values` gave and `contact`, in the precision of then, without counting it."""
         if raised:
             self.raise_precision()

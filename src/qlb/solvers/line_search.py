@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite
 
 from qlb.arrays import FloatArray
@@ -26,6 +27,12 @@ class Point:
     """the gradient without contact"""
     contact: ContactPoint | None = None
 
+    @cached_property
+    def secant(self) -> FloatArray:
+        """The gradient that pairs hold the change of where there is contact: without contact, but with friction."""
+        sliding = None if self.contact is None else self.contact.sliding
+        return self.smooth if sliding is None else self.smooth + sliding
+
     @property
     def is_finite(self) -> bool:
         """Whether the energy and every entry of the gradient are numbers."""
@@ -33,14 +40,14 @@ class Point:
 
     def after(self, before: Point) -> Point:
         """The same, with what contact learns from the step from the point `before`."""
-        if self.contact is None or before.contact is None:
+        if self.contact is None or before.contact is None or self.contact.friction is None:
             return self
         return replace(self, contact=self.contact.after(before.contact))
 
     @staticmethod
-    def at(problem: StageProblem, x: FloatArray) -> Point:
-        """Evaluate `problem` at `x`."""
-        found = problem.evaluate(x)
+    def at(problem: StageProblem, x: FloatArray, *, on_way: bool = False) -> Point:
+        """Evaluate `problem` at `x`; `on_way`: on the way that contact has bounded last."""
+        found = problem.evaluate(x, on_way=on_way)
         residual = problem.residual(found.gradient)
         return Point(x, found.energy, found.gradient, residual, found.smooth, found.contact)
 
@@ -57,7 +64,7 @@ def backtrack(
     rounding = max(ROUNDING * abs(start.energy), problem.energy_rounding)
     t = longest
     for _ in range(MAX_HALVINGS):
-        trial = Point.at(problem, start.x + (p if t == 1.0 else t * p))
+        trial = Point.at(problem, start.x + (p if t == 1.0 else t * p), on_way=True)
         if trial.is_finite:
             change = trial.energy - start.energy
             if change <= ARMIJO * t * slope:

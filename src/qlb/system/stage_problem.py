@@ -10,7 +10,7 @@ import numpy as np
 
 from qlb import _native
 from qlb.arrays import FloatArray
-from qlb.contact.stage import ContactPoint, StageContact, Terms
+from qlb.contact.stage import ContactPoint, StageContact
 from qlb.integrators.integrator import Origin, Stage, State
 from qlb.system.system import System
 from qlb.timing import Timer
@@ -130,12 +130,15 @@ class StageProblem:
         """What rounding may leave of E when the element energies cancel: some eps c^2 sum_e (lambda + 2 mu)_e V_e."""
         return 1e-15 * self.force_scale * self.system.energy_scale
 
-    def evaluate(self, x: FloatArray) -> Evaluation:
-        """E and its gradient at positions `x` (n, 3) [m], contact included."""
+    def evaluate(self, x: FloatArray, *, on_way: bool = False) -> Evaluation:
+        """E and its gradient at positions `x` (n, 3) [m], contact included.
+
+        `on_way`: whether `x` is on the way that contact has bounded last.
+        """
         energy, smooth = self.value_gradient(x)
         if self.contact is None:
             return Evaluation(energy, smooth, smooth, None)
-        contact = self.contact.at(x)
+        contact = self.contact.at(x, on_way=on_way)
         gradient = self.system.clear_held(smooth + contact.gradient)
         return Evaluation(energy + contact.energy, gradient, smooth, contact)
 
@@ -143,17 +146,18 @@ class StageProblem:
         """E without contact and its gradient at positions `x` [m].
 
         In kg m^2 and kg m (J and N in quasistatics); the gradient has shape (n, 3), zero at held degrees of freedom.
-        What was found last is not worked out again: where a solve ends the next pass begins.
+        What was found last is not worked out again for the same array, which nobody changes: where a solve ends the
+        next pass begins.
         """
-        if self._last is not None and np.array_equal(self._last[0], x):
+        if self._last is not None and self._last[0] is x:
             return self._last[1:]
-        system, gradient, energy = self.system, np.zeros_like(x), 0.0
+        system, gradient, energy = self.system, np.zeros(x.shape), 0.0
         with self.timer.section("gradient"):
             for potential in self._potentials:
                 energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
-        self._last = x.copy(), energy, system.clear_held(gradient)
+        self._last = x, energy, system.clear_held(gradient)
         return self._last[1:]
 
     def hessian(
@@ -173,15 +177,14 @@ class StageProblem:
                 system.inertia.add_hessian(self._mass_scale, matrix)
             return matrix
 
-    def contact_terms(self, x: FloatArray, contact: ContactPoint) -> Terms:
+    def contact_terms(self, x: FloatArray, contact: ContactPoint) -> _native.RankOneTerms:
         """The Hessian of `contact` at `x` (n, 3) [m] as a sum of rank-one terms, those along the normals first.
 
         How normals turn is in it where that counts beside the stiffness of the bodies: where forces are large.
         """
         assert self.system.contact is not None
         bending = self.system.contact.barrier.bending(x, contact.contacts, BENDING * self.node_stiffness)
-        vectors = bending.vectors.reshape(-1, 4, 3)
-        return contact.terms((bending.nodes, vectors, bending.stiffness))
+        return contact.terms(bending)
 
     @cached_property
     def node_stiffness(self) -> float:
