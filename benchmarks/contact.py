@@ -90,7 +90,7 @@ def _closing(direction: int) -> Callable[[FloatArray, float], FloatArray]:
 COMMON = ("threads=1", "on_failure=accept")
 SCENES = {
     "bunny": ContactScene(19000, 60, "dropped from 0.1 m, self-contact, mu = 0.3, SDIRK2", bunny),
-    "ducks": ContactScene(10000, 60, f"{DUCKS} that fall on each other, self-contact, mu = 0.3, SDIRK2", ducks),
+    "ducks": ContactScene(20000, 60, f"{DUCKS} that fall on each other, self-contact, mu = 0.3, SDIRK2", ducks),
     "squeeze": ContactScene(20250, 100, "a block between planes that close to half, no friction, BDF2", squeeze),
 }
 

@@ -157,14 +157,15 @@ def fails(solver: str, *rows: str) -> Claim:
     return claim
 
 
-def converge(*solvers: str) -> Claim:
-    """Every step of each of `solvers` converges, in all rows."""
+def converge(*solvers: str, row: str = "") -> Claim:
+    """Every step of each of `solvers` converges, in all rows or in one."""
 
     def claim(measured: Measured) -> Judgement:
-        failed = {s: {label: row[s].failed for label, row in measured.items() if row[s].failed} for s in solvers}
-        bad = [f"{n} steps of {s} in {label}" for s, rows in failed.items() for label, n in rows.items()]
-        counts = ", ".join(f"{s} {sum(rows.values())}" for s, rows in failed.items())
-        told = f"Not converged: {', '.join(bad)}." if bad else "No step failed in any row."
+        rows = {row: measured[row]} if row else measured
+        failed = {s: {label: one[s].failed for label, one in rows.items() if one[s].failed} for s in solvers}
+        bad = [f"{n} steps of {s} in {label}" for s, of_rows in failed.items() for label, n in of_rows.items()]
+        counts = ", ".join(f"{s} {sum(of_rows.values())}" for s, of_rows in failed.items())
+        told = f"Not converged: {', '.join(bad)}." if bad else f"No step failed in {row or 'any row'}."
         return Judgement(f"failed steps: {counts}", not bad, told)
 
     return claim
