@@ -51,7 +51,7 @@ def done(tmp_path_factory, few_solvers) -> Reproduction:
 
 def test_the_figures_are_the_supplements():
     assert list(FIGURES) == list(range(1, 11))
-    assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3, 2, 2, 3, 1, 1]
+    assert [len(figure.rows) for figure in FIGURES.values()] == [4, 2, 2, 2, 3, 2, 2, 3, 2, 1]
     scene = load_scene("bar")
     assert (scene.steps, scene.tolerance.relative, scene.tolerance.absolute) == (120, 1e-6, 0)
 
