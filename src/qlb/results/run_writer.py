@@ -235,6 +235,7 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
         "threads": simulation.threads,
         "tolerance": simulation.tolerance.model_dump(mode="json"),
         "contact": None if contact is None else contact.resolved(),
+        "meshing": _meshing(simulation),
         "versions": {
             "qlb": version("qlb"),
             "python": platform.python_version(),
@@ -243,6 +244,13 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
             "simd": _native.simd_levels()[-1],
         },
     }
+
+
+def _meshing(simulation: Simulation) -> list[dict[str, Any]]:
+    """How meshes were made from surfaces, each once however many bodies have it."""
+    reports = [body.mesh.report for body in simulation.assembly.bodies if body.mesh.report is not None]
+    by_name = {report.name: report for report in reports}
+    return [{"name": name, "facts": dict(r.rows()), "notes": r.notes()} for name, r in by_name.items()]
 
 
 def _scene_text(scene: Mapping[str, object]) -> str:
