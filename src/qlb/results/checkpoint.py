@@ -101,6 +101,7 @@ class CheckpointWriter:
     def __init__(self, directory: Path, run: str) -> None:
         self._directory, self._run = directory, run
         self._kept: list[tuple[FloatArray, Place]] = []
+        self._parts: set[str] | None = None
 
     def write(self, checkpoint: Checkpoint, frame: Iterable[tuple[FloatArray, Place]]) -> None:
         """Write a checkpoint, given where the arrays are that its frame holds to all digits. Raises `WriteError`."""
@@ -120,8 +121,14 @@ class CheckpointWriter:
         own["elsewhere"] = own["elsewhere"].reshape(-1, len(_FIELDS))
         write_arrays(self._directory / layout.CHECKPOINT, own, aside=True)
         self._kept = [(arrays[name], place) for name, place in found.items()]
-        with suppress(OSError):  # the next one tries again
-            layout.remove_checkpoint_parts(self._directory, keep={place.file for place in found.values()})
+        self._remove_all_but({file for file, *_ in found.values() if file.startswith(layout.CHECKPOINT_PART)})
+
+    def _remove_all_but(self, parts: set[str]) -> None:
+        """Delete files that the checkpoint does not name any more."""
+        if parts != self._parts:
+            with suppress(OSError):  # they are in nobody's way
+                layout.remove_checkpoint_parts(self._directory, keep=parts)
+            self._parts = parts
 
 
 def _find(array: FloatArray, known: Sequence[tuple[FloatArray, Place]]) -> Place | None:
