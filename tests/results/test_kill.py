@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import shlex
@@ -9,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from itertools import count
 from multiprocessing.context import ForkServerContext
 from multiprocessing.synchronize import Event
@@ -20,7 +22,7 @@ import numpy as np
 import pytest
 
 from qlb import shapes
-from qlb.results import Run, layout
+from qlb.results import Run, WriteError, layout
 from qlb.results.files import whole_file
 from qlb.scenes import load_scene
 from qlb.studies import resume_run, run_scene
@@ -159,6 +161,33 @@ def test_a_kill_before_each_move_of_a_file(tmp_path, processes, output):
         assert process.exitcode == 0
         _assert_same(Run(directory), unbroken)
     assert kill_at > 4 * 4  # a frame, and a checkpoint that steps aside, for each step at least
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_full_from_some_move_on(tmp_path, monkeypatch):
+    """Also in the midst of a checkpoint's step aside: what was whole stays so, and goes on when there is room."""
+    scene, move, left = load_scene("bar", BAR), os.replace, count()
+    unbroken = run_scene(scene, tmp_path / "unbroken").run
+
+    def replace(*arguments: Any) -> None:
+        if next(left) >= 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        move(*arguments)
+
+    for moves in count():
+        directory, left = tmp_path / str(moves), count(-moves)
+        monkeypatch.setattr(os, "replace", replace)
+        with suppress(WriteError):
+            run_scene(scene, directory)
+            break
+        monkeypatch.undo()
+        if _goes_on(directory):
+            _assert_finished_steps_are_whole(Run(directory), unbroken)
+            resume_run(directory)
+        else:
+            run_scene(scene, directory, overwrite=True)
+        _assert_same(Run(directory), unbroken)
+    assert moves > 4 * 4
 
 
 @pytest.mark.slow
