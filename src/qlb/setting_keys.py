@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import takewhile
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -45,13 +46,15 @@ def at_key(key: str) -> Iterator[None]:
 
 
 def setting_error(model: type[BaseModel], error: ValidationError) -> SettingError:
-    """The first problem of a ValidationError in one line, and how many there are."""
+    """The first problem of a ValidationError in one line, and at how many other keys there are some."""
     problems = error.errors()
     # A misspelt key is a missing one: what is unknown comes first.
     first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
     key, text = _described(model, first)
-    more = len(problems) - 1
-    return SettingError(key, text if more == 0 else f"{text} (and {more} more)")
+    # A list of wrong entries is too short as well, and what fits no member of a union has a problem with each.
+    others = {_described(model, p)[0] for p in problems if p["type"] != "too_short"} - {key}
+    more = f" (and {len(others)} more problem{'s' if len(others) > 1 else ''})" if others else ""
+    return SettingError(key, text + more)
 
 
 def _described(model: type[BaseModel], problem: Any) -> tuple[str, str]:
@@ -59,9 +62,11 @@ def _described(model: type[BaseModel], problem: Any) -> tuple[str, str]:
     kind, given = problem["type"], problem["input"]
     key, beside, members = _locate(model, problem["loc"], unknown=kind == "extra_forbidden")
     if kind == "extra_forbidden":
-        return key, unknown_key(key, beside)
+        return key, unknown_key(key, beside, key_fields(model))
     if kind == "missing":
         return key, f"{key} is missing"
+    if kind == "float_type":
+        return key, f"{key}: {_short(given)} is not a number"
     if kind in ("model_type", "model_attributes_type"):
         return key, f"{key} = {_short(given)} must hold keys and values"
     if kind in ("union_tag_invalid", "union_tag_not_found"):
@@ -123,12 +128,44 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def unknown_key(key: str, valid: Iterable[str]) -> str:
-    """The error for a key that is not one of `valid`, with the nearest that is."""
-    valid = list(dict.fromkeys(valid))
-    near = difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(valid)}"
+def unknown_key(key: str, valid: Iterable[str], elsewhere: Iterable[str] = ()) -> str:
+    """The error for a key that is not one of `valid`, with the nearest: in its name, or of its name `elsewhere`.
+
+    Keys may be those of `key_fields`.
+    """
+    valid = list(dict.fromkeys(numbered(known, key) for known in valid))
+    above, dot, last = key.rpartition(".")
+    same = [
+        known
+        for known in (numbered(k, key) for k in (*valid, *elsewhere))
+        if known.endswith(f".{last}") and (known.startswith(above + dot) or not any(map(is_index, known.split("."))))
+    ]
+    near = sorted(same, key=lambda known: (-_shared(known, key), len(known)))
+    near = near or difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(_as_deep(key, valid))}"
     return f"unknown key '{_cut(key)}'; {hint}"
+
+
+def _shared(a: str, b: str) -> int:
+    """How many parts two keys begin with alike."""
+    return len(list(takewhile(lambda pair: pair[0] == pair[1], zip(a.split("."), b.split("."), strict=False))))
+
+
+def _as_deep(key: str, valid: list[str]) -> list[str]:
+    """Of each key in `valid` as many parts as `key` has, each once."""
+    parts = key.count(".") + 1
+    return list(dict.fromkeys(".".join(known.split(".")[:parts]) for known in valid))
+
+
+def numbered(known: str, key: str) -> str:
+    """A key of `key_fields` with the numbers of entries that `key` has, or 0."""
+    numbers = iter([part for part in key.split(".") if is_index(part)])
+    return ".".join(next(numbers, "0") if part == ENTRY else part for part in known.split("."))
+
+
+def is_index(part: str) -> bool:
+    """Whether this part of a key is the number of an entry in a list."""
+    return part.isascii() and part.isdecimal()
 
 
 def _cut(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar, get_args
@@ -206,7 +207,7 @@ def element_values(
 
 def within(value: Any, bounds: Mapping[str, float], unit: str = "") -> Any:
     """`value` as one of the kinds of `PerElement`. Raises `ValueError` where what is known without a mesh is wrong."""
-    return _checked(_as_varying(value), bounds, unit, whole=False)
+    return _checked(_as_varying(value, unit), bounds, unit, whole=False)
 
 
 def _may_vary(annotation: Any) -> bool:
@@ -214,11 +215,12 @@ def _may_vary(annotation: Any) -> bool:
     return annotation is Varying or any(map(_may_vary, get_args(annotation)))
 
 
-def _as_varying(value: Any) -> Any:
+def _as_varying(value: Any, unit: str) -> Any:
     """`value`, made a table, an expression or a function where it is written as one."""
     if isinstance(value, Mapping):
         return RegionTable.parse(value)
     if isinstance(value, str) and not _is_number(value):
+        _refuse_unit(value, unit)
         return Expression(value)
     return Function(value) if callable(value) else value
 
@@ -250,7 +252,7 @@ def _checked(value: Any, bounds: Mapping[str, float], unit: str, *, whole: bool)
             if _outside(np.float64(number), bounds):
                 raise ValueError(f"{where} = {number:g} is out of range: must be {describe_range(bounds, unit)}")
         return value
-    numbers = _as_numbers(value)
+    numbers = _as_numbers(value, unit)
     bad = _outside(numbers, bounds)
     if whole:
         bad |= np.floor(numbers) != numbers
@@ -274,13 +276,21 @@ def _known_values(value: Varying) -> list[tuple[str, float]]:
     return []
 
 
-def _as_numbers(value: Any) -> FloatArray:
+def _as_numbers(value: Any, unit: str) -> FloatArray:
+    if isinstance(value, str):
+        _refuse_unit(value, unit)
     try:
         if isinstance(value, bool):
             raise TypeError
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{value!r} is not a number") from None
+
+
+def _refuse_unit(text: str, unit: str) -> None:
+    """Raise `ValueError` for a number with a unit behind it."""
+    if re.fullmatch(r"[-+.\d]++(e[-+]?\d+)?+ *(?![xyzt]$)[^\W\d][\w/^ ]*", text.strip(), re.IGNORECASE):
+        raise ValueError(f"{text!r} is not a number: write it without a unit{unit and f', in {unit}'}")
 
 
 def _outside(numbers: FloatArray | np.float64, bounds: Mapping[str, float]) -> Any:

@@ -9,12 +9,14 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from qlb.cli.main import main
+from qlb.scenes import SCENES
 
 SMALL = ["--set", "mesh.cells=4,1,1", "--steps", "3", "--threads", "1"]
 
@@ -188,6 +190,13 @@ def test_quiet_when_not_a_terminal(qlb):
     assert err == ""
     assert "\x1b" not in out
     assert len(out.splitlines()) < 10
+
+
+def test_scenes_and_the_version_are_told(qlb):
+    status, out, _ = qlb("scenes")
+    assert status == 0
+    assert all(name in out for name in (*SCENES, "qlb run NAME"))
+    assert qlb("--version")[:2] == (0, f"qlb {version('qlb')}\n")
 
 
 def test_doctor_is_content(qlb):

@@ -109,6 +109,15 @@ def test_quads_of_a_vtk_file_are_cut_in_two(tmp_path: Path) -> None:
     assert len(Obstacle.read(tmp_path / "plate.vtu").triangles) == 2
 
 
+def test_what_holds_no_triangles_says_what_it_holds(tmp_path: Path) -> None:
+    (tmp_path / "cloud.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    (tmp_path / "words.obj").write_text("no mesh\n")
+    (tmp_path / "cube.foo").write_text("no mesh\n")
+    for name, says in (("cloud.obj", "only points"), ("words.obj", "nor anything else"), ("cube.foo", "suffix '.foo'")):
+        with pytest.raises(InputError, match=says):
+            read_surface(tmp_path / name)
+
+
 def test_tets_are_no_surface_and_a_surface_has_no_tets(tmp_path: Path) -> None:
     FILES["text.vtu"](tmp_path / "tets.vtu")
     with pytest.raises(InputError, match=r"tets.vtu has no triangles, only tetra"):

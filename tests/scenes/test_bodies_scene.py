@@ -291,6 +291,10 @@ TWO = ONE + "  - name: b\n    mesh: {shape: ball, tets: 200}\n    placement: {tr
         (ONE + "version: true\n", "4:1", ["version = True"]),
         (ONE + "scene: bodie\n", "4:1", ["scene = 'bodie' is not known", "bodies"]),
         (ONE + "    mass: 3\n", "4:5", ["unknown key 'bodies.0.mass'"]),
+        (ONE + "    density: 3\n", "4:5", ["'bodies.0.density'; did you mean 'bodies.0.material.density'?"]),
+        (ONE + "gravity: [0, 0, 0]\n", "4:1", ["unknown key 'gravity'; did you mean 'loads.gravity'?"]),
+        (ONE + "step: 10 ms\n", "4:1", ["step: '10 ms' is not a number: write it without a unit, in s"]),
+        (ONE + "    material: {young: 30kPa}\n", "4:16", ["young: '30kPa' is not a number", "without a unit, in Pa"]),
         (ONE + "    mesh: {shape: box}\n", "4:5", ["'mesh'", "again", "line 3"]),
         (ONE + "    material:\n      yong: 3\n", "5:7", ["bodies.0.material.yong", "bodies.0.material.young"]),
         (ONE + "    placement: {height: 1, scale: 2}\n", "4:5", ["bodies.0.placement", "scale and height"]),
@@ -309,7 +313,7 @@ TWO = ONE + "  - name: b\n    mesh: {shape: ball, tets: 200}\n    placement: {tr
         ("bodies:\n  - mesh: {shape: ball, edge: 1e-9}\n", "2:5", ["bodies.0.mesh", "edge 1e-09 is out of range"]),
         ("bodies:\n  - mesh: {shape: box, edge: 1e-9}\n", "2:5", ["bodies.0.mesh", "tets, must be at most 2e+07"]),
         ("bodies:\n  - mesh: {path: no.vtu}\n", "2:5", ["bodies.0.mesh", "no.vtu does not exist"]),
-        (TWO + "pins: [{body: c, nodes: x > 0}]\n", "7:9", ["pins.0.body: no body has the name 'c': a, b"]),
+        (TWO + "pins: [{body: c, nodes: x > 0}]\n", "7:9", ["pins.0.body: no body has the name 'c'; bodies: a, b"]),
         (TWO + "pins: [{nodes: x > 0}]\n", "7:8", ["pins.0.body is missing", "a, b"]),
         (TWO + "pins:\n  - {body: b, nodes: x < 0}\n", "8:15", ["pins.0.nodes", "selects none", "x in [0.90"]),
         (TWO + "pins: [{body: a, nodes: x > 0, axes: xw}]\n", "7:32", ["pins.0.axes", "'xw'"]),
@@ -353,6 +357,22 @@ def test_what_is_wrong_is_named_with_its_place(tmp_path, text, place, words):
     for word in words:
         assert word in message
     assert not (tmp_path / "out").exists()
+
+
+def test_one_mistake_is_one_and_two_are_two(tmp_path):
+    (tmp_path / "scene.yaml").write_text("bodies:\n  - mesh: {shape: bal}\n")
+    with pytest.raises(qlb.InputError, match=r"torus$"):
+        load_scene(str(tmp_path / "scene.yaml"))
+    (tmp_path / "scene.yaml").write_text("bodies:\n  - mesh: {shape: bal}\n  - mesh: {shape: torsu}\nstep: 0\n")
+    with pytest.raises(qlb.InputError, match=r"torus \(and 2 more problems\)$"):
+        load_scene(str(tmp_path / "scene.yaml"))
+
+
+def test_a_name_that_is_nearly_right_is_named(tmp_path):
+    (tmp_path / "scene.yaml").write_text(ONE)
+    for name, meant in (("barr", "bar"), (str(tmp_path / "scene.yml"), str(tmp_path / "scene.yaml"))):
+        with pytest.raises(qlb.InputError, match=f"did you mean '{meant}'"):
+            load_scene(name)
 
 
 def test_the_place_in_a_toml_file(tmp_path):

@@ -191,7 +191,7 @@ def refused(path: Path, text: str) -> str:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "holds NoneType"),
+        (b"", "is empty"),
         (b"- 1\n- 2", "holds list"),
         (b"just text", "holds str"),
         (b"a: \xff\xfe", "not UTF-8 text: byte 3 is 0xff"),

@@ -148,7 +148,10 @@ def test_viscosity_by_region() -> None:
         ("loads.pressure=[3]", ["loads.pressure.0 = 3 must hold keys and values"]),
         ("loads.pressure=[{faces: x > 0}]", ["loads.pressure.0.value is missing"]),
         ("loads.pressure=[{face: x > 0, value: 1}]", ["unknown key 'loads.pressure.0.face'", "faces"]),
-        ("loads.traction=[{nodes: x > 0, value: 1}]", ["unknown key 'loads.traction.0.nodes'", "loads.traction.0."]),
+        (
+            "loads.traction=[{nodes: x > 0, value: 1}]",
+            ["unknown key 'loads.traction.0.nodes'; ", "loads.traction.0.faces"],
+        ),
         ("loads.pressure=[{faces: 1, value: 1}]", ["loads.pressure.0.faces: 1 must be an expression of x, y, z"]),
         ("loads.pressure=[{faces: x >, value: 1}]", ["loads.pressure.0.faces", "is not a formula"]),
         ("loads.pressure=[{faces: t > 1, value: 1}]", ["loads.pressure.0.faces", "'t', which is not known"]),

@@ -58,7 +58,7 @@ def test_quasistatic_gravity_grows_over_the_run_unless_told_otherwise():
     ("text", "words"),
     [
         ("scene: [", ["not valid YAML"]),
-        ("", ["NoneType"]),
+        ("", ["is empty"]),
         ("scene: sphere", ["'sphere'", "bar"]),
         ("scene: bar\nmesh: 3", ["mesh"]),
         ("scene: bar\nspeed: 3", ["'speed'"]),

@@ -46,7 +46,7 @@ def test_a_wrong_choice_is_named_with_those_that_there_are(key: str, allowed: st
 
 
 def test_several_mistakes_are_counted() -> None:
-    with pytest.raises(InputError, match=r"\(and 1 more\)$"):
+    with pytest.raises(InputError, match=r"\(and 1 more problem\)$"):
         Tolerance(relative=-1.0, absolute=-1.0)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from qlb.cli.notes import show_notes
-from qlb.cli.output import console, errors, print_comparison, print_outcome
+from qlb.cli.output import console, errors, print_comparison, print_outcome, print_scenes
 from qlb.cli.progress import Interrupt, StepReporter
 from qlb.errors import InputError, QlbError
 from qlb.integrators import INTEGRATORS
@@ -22,6 +22,15 @@ if TYPE_CHECKING:
 
 CONVERGED, NOT_CONVERGED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        import qlb
+
+        console.print(f"qlb {qlb.__version__}", highlight=False)
+        raise typer.Exit
+
+
 app = typer.Typer(
     name="qlb",
     help="Integrate hyperelastic solids through time. Exit status: 0 all steps converged, 1 a step did not,"
@@ -30,7 +39,17 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Start with `qlb run bar`; `qlb scenes` lists the other scenes, `qlb run --help` the options.",
 )
+
+
+@app.callback()
+def _qlb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit")
+    ] = False,
+) -> None: ...
+
 
 SceneArgument = Annotated[str, typer.Argument(help="A built-in scene (see `qlb scenes`) or a scene file (YAML, TOML)")]
 SetOption = Annotated[
@@ -42,6 +61,8 @@ SolverOption = Annotated[str | None, typer.Option(help=" | ".join(SOLVERS))]
 ThreadsOption = Annotated[int | None, typer.Option(help="Threads; all that the process may use by default")]
 EXPORT_FORMATS = ("vtkhdf", "vtu", "usd", "glb", "obj", "ply", "mp4", "gif")
 OutOption = Annotated[Path | None, typer.Option(help="Where to write; by default the next free runs/NAME-001")]
+CompareOutOption = Annotated[Path | None, typer.Option(help="Where; by default the next free runs/NAME-compare-001")]
+SweepOutOption = Annotated[Path | None, typer.Option(help="Where to write, or to go on; by default runs/NAME-sweep")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in the output folder")]
 PictureOption = Annotated[bool, typer.Option(help="Render the picture of chosen frames")]
 LiveOption = Annotated[bool, typer.Option("--live", help="Show the run in a browser as it goes; prints where")]
@@ -110,7 +131,7 @@ def compare(
     steps: StepsOption = None,
     integrator: IntegratorOption = None,
     threads: ThreadsOption = None,
-    out: OutOption = None,
+    out: CompareOutOption = None,
     overwrite: OverwriteOption = False,
     verbose: VerboseOption = False,
 ) -> None:
@@ -167,10 +188,10 @@ def mesh(
     target: Annotated[
         Path | None, typer.Argument(metavar="[OUT]", help="Where to write tets; the suffix says how")
     ] = None,
-    edge: Annotated[float | None, typer.Option(help="Target edge length [m], after scaling")] = None,
-    tets: Annotated[int | None, typer.Option(help="Or: about how many tets [default: 5000]")] = None,
+    edge: Annotated[float | None, typer.Option(help="Length of edges to aim at, in m, after scaling")] = None,
+    tets: Annotated[int | None, typer.Option(help="Or: about how many tets; 5000 by default")] = None,
     scale: Annotated[float | None, typer.Option(help="Multiply all lengths")] = None,
-    height: Annotated[float | None, typer.Option(help="Or: scale to this height along y [m]")] = None,
+    height: Annotated[float | None, typer.Option(help="Or: scale to this height along y, in m")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT")] = False,
 ) -> None:
     """Look at a mesh, fill a surface with tets, or write tets in another format."""
@@ -187,7 +208,7 @@ def sweep(
         typer.Option("--set", "-s", metavar="KEY=VALUE,...", help="Values of a key; [1,2] in brackets is one"),
     ] = [],  # noqa: B006
     steps: StepsOption = None,
-    out: OutOption = None,
+    out: SweepOutOption = None,
     processes: Annotated[int | None, typer.Option(help="Runs at a time; by default one for each CPU")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers run them")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Run everything in the output folder again")] = False,
@@ -206,8 +227,7 @@ def scenes(
 ) -> None:
     """List the built-in scenes, or print one as a scene file."""
     if show is None:
-        for name, kind in SCENES.items():
-            console.print(f"[bold]{name}[/]  {(kind.__doc__ or '').splitlines()[0]}")
+        print_scenes(SCENES)
         return
     if show not in SCENES:
         raise InputError(f"scene {show!r} is not known; built-in scenes: {', '.join(SCENES)}")

@@ -85,6 +85,7 @@ def _print_surface(source: Path, found: SurfaceReport, size: list[float]) -> Non
     _add_rows(table, found.rows())
     table.add_row("size", " x ".join(f"{length:.4g}" for length in size) + " m")
     console.print(table)
+    console.print(f"qlb mesh {escape(str(source))} NAME.msh fills it with tets", soft_wrap=True, highlight=False)
     for note in found.notes():
         errors.print(f"[yellow]note:[/] {escape(source.name)}: {escape(note)}", soft_wrap=True, highlight=False)
 

@@ -38,6 +38,17 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     return f"[red]not converged[/] in {steps} ({which}): {counts}{reason}"
 
 
+def print_scenes(scenes: Mapping[str, type]) -> None:
+    """Name and first line of each scene, and how to go on."""
+    table = Table(Column(style="bold", no_wrap=True), "", show_header=False, box=None, pad_edge=False)
+    for name, kind in scenes.items():
+        table.add_row(name, escape((kind.__doc__ or "").splitlines()[0]))
+    console.print(table)
+    console.print(
+        "`qlb run NAME` runs one; `qlb scenes --show NAME > mine.yaml` writes it as a file to change and run."
+    )
+
+
 def print_comparison(rows: Sequence[Mapping[str, Any]], report: Path) -> None:
     """The table of `qlb compare`."""
     table = Table(Column("solver", overflow="fold"), "steps", "failed", "mean", "max", "factors", "CPU s", "off by")

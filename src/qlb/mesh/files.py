@@ -76,7 +76,10 @@ class MeshFile:
 
     def _used(self, cells: LongArray, what: str) -> tuple[FloatArray, IntArray]:
         if len(cells) == 0:
-            raise InputError(f"mesh file {self.path} has no {what}, only {', '.join(self.kinds) or 'nothing'}")
+            found = (
+                f"only {', '.join(self.kinds)}" if self.kinds else "nor anything else, or is not what its suffix says"
+            )
+            raise InputError(f"mesh file {self.path} has no {what}, {found}")
         used, renumbered = np.unique(cells, return_inverse=True)
         positions = self.points[used]
         bad = ~(np.abs(positions) < LARGEST).all(axis=1)

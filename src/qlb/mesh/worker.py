@@ -106,6 +106,8 @@ def _limit_memory(spare: int | None) -> None:
 def _read_meshio(path: Path) -> tuple[dict[str, Any], Arrays]:
     import meshio
 
+    if not any(map(path.name.lower().endswith, meshio.extension_to_filetypes)):
+        raise Refused(f"the suffix {path.suffix!r} is of no format that is known, such as .obj, .stl, .ply, .msh, .vtu")
     data = meshio.read(path)
     blocks = [(block.type, np.asarray(block.data)) for block in data.cells if len(block.data)]
     halves = np.array([[0, 1, 2], [0, 2, 3]])
@@ -125,6 +127,8 @@ def _read_meshio(path: Path) -> tuple[dict[str, Any], Arrays]:
 
 
 SIDES = ("triangle", "quad")
+PARTS = {"PointCloud": "points", "Path2D": "lines", "Path3D": "lines"}
+"""What trimesh makes of a file without triangles."""
 
 
 def _read_trimesh(path: Path) -> tuple[dict[str, Any], Arrays]:
@@ -137,8 +141,8 @@ def _read_trimesh(path: Path) -> tuple[dict[str, Any], Arrays]:
         geometry = scene.geometry[name]
         if isinstance(geometry, trimesh.Trimesh):
             parts.append((np.asarray(geometry.vertices), np.asarray(geometry.faces), np.asarray(transform)))
-    kinds = sorted({type(geometry).__name__ for geometry in scene.geometry.values()})
-    return {"kinds": kinds if not parts else ["triangle"]}, _joined(parts)
+    kinds = sorted(PARTS.get(type(geometry).__name__, "others") for geometry in scene.geometry.values())
+    return {"kinds": list(dict.fromkeys(kinds)) if not parts else ["triangle"]}, _joined(parts)
 
 
 def _read_usd(path: Path) -> tuple[dict[str, Any], Arrays]:

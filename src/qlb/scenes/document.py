@@ -128,5 +128,6 @@ def read_document(path: Path, parsers: Mapping[str, Callable[[str], Node]]) -> D
         at = Document(path, Node.of(None)).at(problem.place)
         raise InputError(f"{at}: not valid {name} for a scene: {' '.join(str(problem).split())}") from None
     if not isinstance(root.value, dict):
-        raise InputError(f"scene file {path} holds {type(root.value).__name__}, must hold keys and values")
+        what = "is empty" if root.value is None else f"holds {type(root.value).__name__}"
+        raise InputError(f"scene file {path} {what}, must hold keys and values")
     return Document(path, root)

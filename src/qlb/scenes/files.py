@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, get_args
@@ -49,17 +50,26 @@ def load_scene(name: str, overrides: Iterable[str] = ()) -> Scene:
 
 
 def _read(name: str) -> Document:
-    from qlb.scenes import SCENES
-
     path = Path(name)
     try:
         found = path.is_file()
     except OSError:  # a name that is too long
         found = False
     if not found:
-        known = f"built-in scenes: {', '.join(SCENES)}"
-        raise InputError(f"scene {_shown(name)} is neither a built-in scene nor a file; {known}")
+        raise InputError(f"scene {_shown(name)} is neither a built-in scene nor a file; {_meant(path)}")
     return read_document(path, PARSERS)
+
+
+def _meant(path: Path) -> str:
+    """What may have been meant by the name of a scene that is not there."""
+    from qlb.scenes import SCENES
+
+    try:
+        files = [str(path.parent / p.name) for p in path.parent.iterdir() if p.suffix in PARSERS] if path.suffix else []
+    except OSError:
+        files = []
+    near = difflib.get_close_matches(str(path), [*SCENES, *files], n=1, cutoff=0.7)
+    return f"did you mean {near[0]!r}?" if near else f"built-in scenes: {', '.join(SCENES)}"
 
 
 def _kind(document: Document) -> type[Scene]:

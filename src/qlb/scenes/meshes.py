@@ -78,7 +78,12 @@ _ARGUMENTS: dict[str, tuple[Any, str, dict[str, Any]]] = {
 def _shape_model(name: str) -> type[ShapeMesh]:
     """The settings of a shape, from the arguments of the function that makes it."""
     function = SHAPES[name]
-    fields: dict[str, Any] = {"shape": (Literal[name], Field(name, description="A shape that needs no file"))}
+    fields: dict[str, Any] = {
+        "shape": (
+            Literal[name],
+            Field(name, description="A shape; for a file give `path` in place of it and its arguments"),
+        )
+    }
     for argument, parameter in inspect.signature(function).parameters.items():
         if argument == "size":
             fields[argument] = (Vector, Field(parameter.default, description="Lengths along x, y, z [m], all > 0"))

@@ -9,7 +9,7 @@ import yaml
 from pydantic import BaseModel
 
 from qlb.errors import InputError
-from qlb.setting_keys import ENTRY, key_fields, unknown_key
+from qlb.setting_keys import ENTRY, is_index, key_fields, unknown_key
 
 
 def override(kind: type[BaseModel], data: dict[str, Any], pair: str) -> str:
@@ -24,14 +24,14 @@ def override(kind: type[BaseModel], data: dict[str, Any], pair: str) -> str:
         raise InputError(f"--set {pair!r} must have the form KEY=VALUE")
     valid = key_fields(kind)
     parts = key.split(".")
-    pattern = ".".join(ENTRY if _is_index(part) else part for part in parts)
+    pattern = ".".join(ENTRY if is_index(part) else part for part in parts)
     if not any(f"{known}.".startswith(f"{pattern}.") for known in valid):
-        raise InputError(unknown_key(key, (_numbered(known, parts) for known in valid)))
+        raise InputError(unknown_key(key, valid))
     place: Any = data
     for depth, (part, following) in enumerate(itertools.pairwise(parts), start=1):
         index = _index(place, part, ".".join(parts[: depth - 1]))
         if isinstance(place, dict) and place.get(part) is None:
-            place[part] = [] if _is_index(following) else {}
+            place[part] = [] if is_index(following) else {}
         place = place[index]
         if not isinstance(place, dict | list):
             raise InputError(f"{'.'.join(parts[:depth])} = {place!r} must hold keys and values")
@@ -39,22 +39,11 @@ def override(kind: type[BaseModel], data: dict[str, Any], pair: str) -> str:
     return key
 
 
-def _numbered(known: str, parts: list[str]) -> str:
-    """A key of `key_fields` with the numbers of entries that `parts` have, or 0."""
-    numbers = iter([part for part in parts if _is_index(part)])
-    return ".".join(next(numbers, "0") if part == ENTRY else part for part in known.split("."))
-
-
-def _is_index(part: str) -> bool:
-    """Whether this part of a key is the number of an entry in a list."""
-    return part.isascii() and part.isdecimal()
-
-
 def _index(place: dict[str, Any] | list[Any], part: str, key: str) -> Any:
     """What leads to `part` of a key within `place`, which is at `key`. Raises `InputError` for an entry it lacks."""
-    if isinstance(place, dict) and not _is_index(part):
+    if isinstance(place, dict) and not is_index(part):
         return part
-    if isinstance(place, list) and _is_index(part) and int(part) < len(place):
+    if isinstance(place, list) and is_index(part) and int(part) < len(place):
         return int(part)
     kind = f"a list of {len(place)} entries" if isinstance(place, list) else "no list"
     raise InputError(f"{key} is {kind} and has no entry {part}")

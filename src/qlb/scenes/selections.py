@@ -72,7 +72,7 @@ class OfBody(Settings):
 def unknown_body(key: str, name: str, known: list[str]) -> SettingError:
     """The error for a name that no body has."""
     names = ", ".join(name for name in known if name) or "none has a name"
-    return SettingError(key, f"{key}: no body has the name {name!r}: {names}")
+    return SettingError(key, f"{key}: no body has the name {name!r}; bodies: {names}")
 
 
 def selected(key: str, what: str, expression: Expression, points: FloatArray) -> IntArray:
