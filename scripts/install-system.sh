@@ -26,7 +26,7 @@ if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null 2>&1 || { echo "As root, run: apt-get install$missing" >&2; exit 1; }
   sudo="sudo"
 fi
-echo "Installing system packages:$missing"
+echo "Installing system packages, which takes some minutes:$missing"
 $sudo apt-get update -qq
 # shellcheck disable=SC2086  # a list of words on purpose
-DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends $missing >/dev/null
+$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null

@@ -129,32 +129,33 @@ def _short(value: Any) -> str:
 
 
 def unknown_key(key: str, valid: Iterable[str], elsewhere: Iterable[str] = ()) -> str:
-    """The error for a key that is not one of `valid`, with the nearest: in its name, or of its name `elsewhere`.
+    """The error for a key that is not one of `valid`, with the one that is meant, or those that are beside it.
 
-    Keys may be those of `key_fields`.
+    Meant may be one of the same name in another place, `elsewhere` as well. Keys may be those of `key_fields`.
     """
     valid = list(dict.fromkeys(numbered(known, key) for known in valid))
-    above, dot, last = key.rpartition(".")
-    same = [
-        known
-        for known in (numbered(k, key) for k in (*valid, *elsewhere))
-        if known.endswith(f".{last}") and (known.startswith(above + dot) or not any(map(is_index, known.split("."))))
-    ]
-    near = sorted(same, key=lambda known: (-_shared(known, key), len(known)))
-    near = near or difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(_as_deep(key, valid))}"
+    above, _, last = key.rpartition(".")
+    level = list(dict.fromkeys(".".join(known.split(".")[: key.count(".") + 1]) for known in valid))
+    beside = {known.rpartition(".")[2]: known for known in level if known.rpartition(".")[0] == above}
+    near = _namesakes(key, [*valid, *(numbered(known, key) for known in elsewhere)])
+    near += [beside[name] for name in difflib.get_close_matches(last, beside, n=1, cutoff=0.6)]
+    if not beside:
+        near += difflib.get_close_matches(key, valid, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'?" if near else f"valid keys: {', '.join(beside.values() or level)}"
     return f"unknown key '{_cut(key)}'; {hint}"
+
+
+def _namesakes(key: str, valid: list[str]) -> list[str]:
+    """Those of `valid` that have the last part of `key`, the nearest first; no entries of other lists."""
+    above, dot, last = key.rpartition(".")
+    same = [known for known in valid if known.endswith(f".{last}")]
+    same = [known for known in same if known.startswith(above + dot) or not any(map(is_index, known.split(".")))]
+    return sorted(same, key=lambda known: (-_shared(known, key), len(known)))
 
 
 def _shared(a: str, b: str) -> int:
     """How many parts two keys begin with alike."""
     return len(list(takewhile(lambda pair: pair[0] == pair[1], zip(a.split("."), b.split("."), strict=False))))
-
-
-def _as_deep(key: str, valid: list[str]) -> list[str]:
-    """Of each key in `valid` as many parts as `key` has, each once."""
-    parts = key.count(".") + 1
-    return list(dict.fromkeys(".".join(known.split(".")[:parts]) for known in valid))
 
 
 def numbered(known: str, key: str) -> str:

@@ -364,7 +364,7 @@ def test_one_mistake_is_one_and_two_are_two(tmp_path):
     with pytest.raises(qlb.InputError, match=r"torus$"):
         load_scene(str(tmp_path / "scene.yaml"))
     (tmp_path / "scene.yaml").write_text("bodies:\n  - mesh: {shape: bal}\n  - mesh: {shape: torsu}\nstep: 0\n")
-    with pytest.raises(qlb.InputError, match=r"torus \(and 2 more problems\)$"):
+    with pytest.raises(qlb.InputError, match=r"out of range: must be > 0 s \(and 2 more problems\)$"):
         load_scene(str(tmp_path / "scene.yaml"))
 
 
