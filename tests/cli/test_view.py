@@ -18,7 +18,7 @@ from qlb.studies import run_scene
 def view(monkeypatch, capsys):
     """Call `qlb view ARGUMENTS`: (exit status, output, addresses opened)."""
     opened: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", opened.append)
+    monkeypatch.setattr(webbrowser, "open", lambda address: not opened.append(address))
     monkeypatch.setattr("qlb.results.report.render_frames", lambda run, path: None)
 
     def call(*arguments: object) -> tuple[int, str, list[str]]:
@@ -42,6 +42,11 @@ def test_makes_and_opens_the_page(view, run):
     assert status == 0
     assert out.splitlines() == [str(page)]
     assert opened == [page.as_uri()]
+
+
+def test_says_that_there_is_no_browser(view, run, monkeypatch):
+    monkeypatch.setattr(webbrowser, "open", lambda address: False)
+    assert "no browser was found" in view(run)[1]
 
 
 def test_makes_the_page_again_only_where_it_is_old(view, run):

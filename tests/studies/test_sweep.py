@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import subprocess
 import sys
 from itertools import product
 from pathlib import Path
@@ -35,6 +36,17 @@ def table(directory: Path) -> list[dict[str, str]]:
 
 def untimed(directory: Path) -> list[dict[str, str]]:
     return [{key: value for key, value in row.items() if key not in TIMINGS} for row in table(directory)]
+
+
+def test_a_case_is_not_charged_for_imports(tmp_path: Path) -> None:
+    """A run in a fresh process, as cases are: nothing slow is imported within its time loop."""
+    code = (
+        "import sys; from pathlib import Path; from qlb.scenes import load_scene; from qlb.studies import run_scene\n"
+        f"out = Path({str(tmp_path / 'out')!r})\n"
+        "run_scene(load_scene('bar', ['mesh.cells=4,1,1', 'steps=2']), out, overwrite=True)\n"
+        "assert 'matplotlib.figure' not in sys.modules and 'qlb.export' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-P", "-c", code], check=True)
 
 
 def test_the_cases_are_the_product_in_order(tmp_path: Path) -> None:

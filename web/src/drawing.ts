@@ -8,7 +8,13 @@ import { cssColour, element } from "./dom";
 
 type Settings = Record<string, unknown>;
 
-const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+const CONFIG = {
+  displaylogo: false,
+  // without a pointer the buttons would always be there, over the legend
+  displayModeBar: window.matchMedia("(hover: none)").matches ? false : ("hover" as const),
+  responsive: true,
+  modeBarButtonsToRemove: ["select2d", "lasso2d"],
+};
 
 export async function drawInto(box: HTMLElement, plot: Plot): Promise<void> {
   await Plotly.react(box, plot.traces, layoutOf(plot), CONFIG);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import webbrowser
 from pathlib import Path
 
-from qlb.cli.output import console
+from qlb.cli.output import console, errors
 from qlb.errors import InputError
 from qlb.results import Run, finish_run, layout
 from qlb.results.figure import PAGE
@@ -22,8 +22,8 @@ def view(directory: Path, *, show: bool) -> None:
     """
     page = _page(directory)
     console.print(str(page), soft_wrap=True, highlight=False, markup=False)
-    if show:
-        webbrowser.open(page.resolve().as_uri())
+    if show and not webbrowser.open(page.resolve().as_uri()):
+        errors.print("[yellow]note:[/] no browser was found here: open the page in one", soft_wrap=True)
 
 
 def _page(directory: Path) -> Path:

@@ -13,6 +13,7 @@ from qlb.export import glb, obj, ply, usd, video, vtkhdf, vtu
 from qlb.export.format import Format
 from qlb.export.recording import Recording
 from qlb.results import Run, WriteError
+from qlb.results.layout import EXPORTS
 
 FORMATS: dict[str, Format] = {
     format.name: format
@@ -28,9 +29,6 @@ FORMATS: dict[str, Format] = {
     )
 }
 """Every format by its name."""
-
-FOLDER = "exports"
-"""Where exports go by default, in the run directory."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def remove_exports(directory: Path) -> None:
     Raises:
         WriteError: a file could not be deleted.
     """
-    folder, name = directory / FOLDER, directory.resolve().name
+    folder, name = directory / EXPORTS, directory.resolve().name
     if not folder.is_dir():
         return
     paths = [(format, folder / f"{name}{suffix}") for format in FORMATS.values() for suffix in format.suffixes]
@@ -141,7 +139,7 @@ def _given(format: Format, options: dict[str, object]) -> dict[str, object]:
 
 def _path(run: Run, out: Path | None, format: Format) -> Path:
     """The file that stands for the export; its folder is made."""
-    out = run.directory / FOLDER if out is None else out
+    out = run.directory / EXPORTS if out is None else out
     suffix = out.suffix.lower()
     if out.is_dir() or not any(suffix in other.suffixes for other in FORMATS.values()):
         out = out / f"{run.directory.resolve().name}{format.suffixes[0]}"

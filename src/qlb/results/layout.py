@@ -57,6 +57,8 @@ CHECKPOINT = "checkpoint.npz"
 CHECKPOINT_PART = "checkpoint-"
 SUMMARY = "summary.json"
 LOCK = "run.lock"
+EXPORTS = "exports"
+"""Where exports go by default."""
 REPORT = "report.html"
 FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals", "contact", "seconds")}
 """Images of a run, by the name that `finish_run` gives them, in the order of the report."""
@@ -98,6 +100,8 @@ def check_marker(directory: Path) -> str:
         marker = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
         missing = "it has no run.json" if directory.is_dir() else "there is no such folder"
+        inner = sorted([*directory.glob(f"*/{MARKER}"), *directory.glob(f"*/*/{MARKER}")])
+        missing += f", but runs within it, such as {inner[0].parent}" if inner else ""
         raise InputError(f"{directory} is not a qlb run: {missing}") from None
     except (ValueError, RecursionError, OSError) as error:
         raise InputError(f"{directory} is not a qlb run: run.json cannot be read ({_line(error)})") from None

@@ -9,7 +9,7 @@ from typing import Any
 
 from qlb.errors import InputError
 from qlb.results import Run, RunWriter
-from qlb.results.layout import SCENE
+from qlb.results.layout import EXPORTS, SCENE
 from qlb.scenes import Scene, load_scene
 from qlb.simulation import Simulation
 from qlb.step_result import StepFailed, StepResult
@@ -57,7 +57,7 @@ def run_scene(
     writer = RunWriter(
         directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite, **scene.output.model_dump()
     )
-    if overwrite:
+    if overwrite and (directory / EXPORTS).is_dir():  # else without the import, which takes long
         from qlb.export import remove_exports
 
         remove_exports(directory)
