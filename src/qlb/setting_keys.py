@@ -61,10 +61,14 @@ def _described(model: type[BaseModel], problem: Any) -> tuple[str, str]:
     """Key and message of one problem of a ValidationError."""
     kind, given = problem["type"], problem["input"]
     key, beside, members = _locate(model, problem["loc"], unknown=kind == "extra_forbidden")
+    if kind == "invalid_key":
+        return key, f"unknown key '{key}'"
     if kind == "extra_forbidden":
         return key, unknown_key(key, beside, key_fields(model))
     if kind == "missing":
         return key, f"{key} is missing"
+    if kind == "tuple_type":
+        return key, f"{key} = {_short(given)} must be a list"
     if kind == "float_type":
         return key, f"{key}: {_short(given)} is not a number"
     if kind in ("model_type", "model_attributes_type"):
@@ -83,10 +87,12 @@ def _described(model: type[BaseModel], problem: Any) -> tuple[str, str]:
 
 def _wrong_tag(key: str, given: Any, context: Any, members: list[type[BaseModel]]) -> tuple[str, str]:
     """Key and message for something that tells none of `members`."""
-    if not isinstance(given, dict):
-        return key, f"{key} = {_short(given)} must hold keys and values"
     tag = next((tag for tag in TAGS if any(tag in member.model_fields for member in members)), TAGS[0])
     options = [str(m.model_fields[tag].default) for m in members if tag in m.model_fields]
+    if not isinstance(given, dict):
+        file = isinstance(given, str) and given not in options and any("path" in m.model_fields for m in members)
+        example = f"{{path: {given}}}" if file else f"{{{tag}: {given if given in options else options[0]}}}"
+        return key, f"{key} = {_short(given)} must hold keys and values, such as {example}"
     allowed = f"must be one of {', '.join(options)}"
     if tag not in given:
         return key, f"{key}.{tag} is missing: {allowed}"

@@ -185,7 +185,7 @@ def test_what_bodies_have_themselves_is_refused_beside_them(name, value):
 
 
 def test_a_mesh_needs_a_material():
-    with pytest.raises(InputError, match="material = None is out of range: must be a Material"):
+    with pytest.raises(InputError, match="material is missing: must be a Material"):
         Simulation(small_bar())
 
 

@@ -305,6 +305,13 @@ TWO = ONE + "  - name: b\n    mesh: {shape: ball, tets: 200}\n    placement: {tr
         ("bodies: []\n", "1:1", ["bodies", "at least 1"]),
         ("bodies: 3\n", "1:1", ["bodies: 3 must be a list"]),
         ("bodies:\n  - 3\n", "2:5", ["bodies.0 = 3 must hold keys and values"]),
+        (
+            "bodies:\n  - mesh: a.obj\n",
+            "2:5",
+            ["bodies.0.mesh = 'a.obj' must hold keys and values, such as {path: a.obj}"],
+        ),
+        ("bodies:\n  - mesh: ball\n", "2:5", ["must hold keys and values, such as {shape: ball}"]),
+        (ONE + "    material: rubber\n", "4:5", ["must hold keys and values, such as {model: SNH}"]),
         ("bodies:\n  - {name: a}\n", "2:5", ["bodies.0.mesh is missing"]),
         ("bodies:\n  - mesh: {radius: 3}\n", "2:5", ["bodies.0.mesh.shape is missing", "ball"]),
         ("bodies:\n  - mesh: {shape: bal}\n", "2:12", ["bodies.0.mesh.shape: 'bal' is not known", "ball"]),

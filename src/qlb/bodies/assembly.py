@@ -152,7 +152,8 @@ def assemble(
     """
     if isinstance(given, TetMesh):
         if not isinstance(material, Material):
-            raise InputError(f"material = {material!r} is out of range: must be a Material")
+            problem = "is missing" if material is None else f"= {material!r} is out of range"
+            raise InputError(f"material {problem}: must be a Material, such as qlb.StableNeoHookean()")
         still = (0.0, 0.0, 0.0)
         body = Body(given, material, fibres=tuple(fibres), velocity=still if velocity is None else velocity)
         return Assembly([body], obstacles)

@@ -23,7 +23,8 @@ def print_outcome(summary: Mapping[str, Any], files: Mapping[str, Path]) -> None
 
 def _verdict(summary: Mapping[str, Any]) -> str:
     counts = (
-        f"{summary['steps']} steps, {summary['iterations_mean']:.2f} iterations a step (at most"
+        f"{summary['steps']} step{'' if summary['steps'] == 1 else 's'},"
+        f" {summary['iterations_mean']:.2f} iterations a step (at most"
         f" {summary['iterations_max']}), {summary['factorizations']} factorizations,"
         f" {summary['wall_seconds']:.2f} s ({summary['cpu_seconds']:.2f} s CPU)"
     )
