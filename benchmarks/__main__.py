@@ -8,11 +8,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import armadillo, contact, kernels, step, variations
+from benchmarks import armadillo, contact, kernels, step, variations, writing
 from benchmarks.rivals import runner
 
 ARMADILLO = Path("armadillo13K.msh")
-NAMES = ("kernels", "factor", "step", "ablation", "variations", "armadillo", "contact", "rivals")
+NAMES = ("kernels", "factor", "step", "ablation", "variations", "armadillo", "contact", "writing", "rivals")
 
 
 def main() -> None:
@@ -39,6 +39,7 @@ def main() -> None:
             repeats=options.repeats,
             limit=options.limit,
         ),
+        "writing": lambda: writing.table(sizes, **runs),
         "rivals": lambda: runner.table(sizes, [name for name in options.only.split(",") if name], rivals),
     }
     for name in options.which or ["kernels", "factor", "step"]:

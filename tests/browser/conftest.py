@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -35,8 +35,14 @@ def open_page(browser: Browser) -> Iterator[Open]:
     """Open a file or an address in a window of its own; at the end no page may have complained."""
     opened: list[OpenPage] = []
 
-    def make(where: Path | str, *, width: int = 800, scheme: str = "light") -> OpenPage:
-        opened.append(OpenPage(browser, where, width, scheme))
+    def make(
+        where: Path | str,
+        *,
+        width: int = 800,
+        scheme: str = "light",
+        ready: Sequence[str] = ("#viewer-root", "#plots-root"),
+    ) -> OpenPage:
+        opened.append(OpenPage(browser, where, width, scheme, ready))
         return opened[-1]
 
     yield make

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,9 @@ PIXELS = """async (canvas) => {
 
 
 class OpenPage:
-    """A page whose 3D view and plots are drawn."""
+    """A page of which the elements `ready`, such as 3D view and plots, are drawn."""
 
-    def __init__(self, browser: Browser, where: Path | str, width: int, scheme: str) -> None:
+    def __init__(self, browser: Browser, where: Path | str, width: int, scheme: str, ready: Sequence[str]) -> None:
         self.page = browser.new_page(viewport={"width": width, "height": 700}, color_scheme=scheme)  # type: ignore[arg-type]
         self.page.set_default_timeout(SECONDS)
         self.complaints: list[str] = []
@@ -34,8 +35,8 @@ class OpenPage:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", self._asked)
         self.page.goto(where.resolve().as_uri() if isinstance(where, Path) else where)
-        self.page.wait_for_selector("#viewer-root[data-ready=yes]")
-        self.page.wait_for_selector("#plots-root[data-ready=yes]")
+        for element in ready:
+            self.page.wait_for_selector(f"{element}[data-ready=yes]")
 
     @property
     def step(self) -> int:

@@ -68,5 +68,5 @@ def test_opens_pages_of_comparisons_and_figures(view, tmp_path):
 def test_refuses_what_has_no_page(view, tmp_path):
     status, out, opened = view(tmp_path)
     assert status == 2
-    assert "not a run, a comparison or figures" in out
+    assert "not a run, a comparison, a sweep or figures" in out
     assert opened == []

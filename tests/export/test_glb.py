@@ -1,11 +1,14 @@
-"""Animated GLB: the rules of the standard that can be checked without its validator, and the vertices of every frame,
-taken apart here by `struct` and by two loaders.
+"""Animated GLB: the validator of Khronos finds nothing, and the vertices of every frame are those of the run.
+
+They are taken apart here by `struct` and by two loaders.
 """
 
 from __future__ import annotations
 
 import json
+import shutil
 import struct
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +126,32 @@ def test_the_document_keeps_the_rules(run, tmp_path):
     assert all(0 <= begin - end < 4 for begin, end in zip(begins[1:], ends[:-1], strict=True))
     for k in range(len(document["accessors"])):
         accessor(document, binary, k)
+
+
+def validated(*paths: Path) -> list[dict[str, Any]]:
+    """What the validator says of each file; a development dependency of web/."""
+    web = Path(__file__).parents[2] / "web"
+    if shutil.which("node") is None or not (web / "node_modules" / "gltf-validator").is_dir():
+        pytest.skip("needs Node.js and web/node_modules (npm ci --prefix web)")
+    command = ["node", str(web / "validate-glb.mjs"), *map(str, paths)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [report["issues"] for report in json.loads(done.stdout)]
+
+
+def test_the_validator_finds_nothing(run, bar, make_still, tmp_path):
+    """Not even a hint: several bodies, obstacles and planes that move and stand, one body, a single frame."""
+    recordings = [Recording.of(run), Recording.of(bar), Recording.of(bar, "2"), Recording.of(make_still())]
+    paths = [write_glb(recording, tmp_path / f"{k}.glb")[0] for k, recording in enumerate(recordings)]
+    assert [issues["messages"] for issues in validated(*paths)] == [[]] * len(paths)
+
+
+def test_the_validator_is_listened_to(bar, tmp_path):
+    (path,) = write_glb(Recording.of(bar), tmp_path / "bar.glb")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-8] + b"\xff" * 8)  # not a number
+    (issues,) = validated(path)
+    assert issues["numErrors"] > 0
 
 
 def test_trimesh_and_pygltflib_load_it(run, tmp_path):

@@ -13,6 +13,8 @@ import qlb
 from qlb.cli.main import EXPORT_FORMATS, main
 from qlb.export import FORMATS, Recording, export_run
 from qlb.results import MissingExtra, Run, WriteError
+from qlb.scenes import load_scene
+from qlb.studies import run_scene
 
 FILES = ("vtkhdf", "vtu", "usd", "glb", "obj", "ply")
 """Formats that need no rendering."""
@@ -151,6 +153,27 @@ def test_places(bar, tmp_path, monkeypatch):
     Path("file").write_text("precious")
     with pytest.raises(qlb.InputError, match="output folder file is a file"):
         export_run(bar, Path("file/x.glb"))
+
+
+def test_a_run_that_takes_the_place_of_another_takes_its_exports_along(tmp_path):
+    """By the names that `qlb export` gives them; what a user put beside them stays."""
+    directory, scene = tmp_path / "bar", load_scene("bar", ["mesh.cells=2,1,1", "steps=2", "threads=1"])
+    run = run_scene(scene, directory).run
+    for name in ("glb", "obj", "vtu", "ply"):
+        export_run(run, format=name)
+    kept = {directory / "exports" / name for name in ("bar_notes.obj", "mine.glb", "bar.txt")}
+    for path in kept:
+        path.write_text("precious")
+    assert len(list((directory / "exports").iterdir())) > len(kept) + 4
+    with pytest.raises(qlb.InputError, match="holds another run"):
+        run_scene(scene, directory)
+    assert (directory / "exports" / "bar.glb").exists()
+    run_scene(scene, directory, overwrite=True)
+    assert set((directory / "exports").iterdir()) == kept
+    for path in kept:
+        path.unlink()
+    run_scene(scene, directory, overwrite=True)
+    assert not (directory / "exports").exists()
 
 
 def test_progress_counts_every_frame_once(bar, tmp_path):

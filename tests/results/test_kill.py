@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
+import os
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
+from contextlib import suppress
+from itertools import count
 from multiprocessing.context import ForkServerContext
 from multiprocessing.synchronize import Event
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
 import pytest
 
 from qlb import shapes
-from qlb.results import Run, layout
+from qlb.results import Run, WriteError, layout
+from qlb.results.files import whole_file
 from qlb.scenes import load_scene
 from qlb.studies import resume_run, run_scene
 
 STEPS = 12
+BAR = ["mesh.cells=12,4,4", "steps=4", "threads=1"]  # whose states are too large for checkpoint.npz
 CONTACT = ["drop.height=0.005", "contact.friction=0.3", f"steps={STEPS}", "threads=1", "solver=QLA"]
 
 
@@ -29,10 +37,30 @@ def _run(directory: Path, mesh: Path, started: Event | None = None) -> None:
     if started is not None:
         lock = layout.lock
         layout.lock = lambda directory: started.set() or lock(directory)
-    if (directory / "checkpoint.npz").exists():
+    if _goes_on(directory):
         resume_run(directory)
     else:
         run_scene(load_scene("bunny", [*CONTACT, f"mesh.path={mesh}"]), directory, overwrite=directory.exists())
+
+
+def _goes_on(directory: Path) -> bool:
+    return whole_file(directory / "checkpoint.npz").exists()
+
+
+def _bar(directory: Path, output: list[str], kill_at: int = -1) -> None:
+    """Begin or go on with a bar; the process is killed before it moves a file for that time (`os.replace`)."""
+    moves, move = count(), os.replace
+
+    def replace(*arguments: Any) -> None:
+        if next(moves) == kill_at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        move(*arguments)
+
+    os.replace = replace
+    if _goes_on(directory):
+        resume_run(directory)
+    else:
+        run_scene(load_scene("bar", [*BAR, *output]), directory, overwrite=directory.exists())
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +73,7 @@ def processes() -> ForkServerContext:
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    shape = shapes.bunny(tets=500)
+    shape = shapes.bunny(tets=700)
     path = tmp_path_factory.mktemp("mesh") / "bunny.vtu"
     meshio.write_points_cells(path, shape.positions, {"tetra": shape.tets})
     return path
@@ -105,10 +133,61 @@ def test_five_kills_at_random_moments(tmp_path, processes, mesh, unbroken, seed)
             longest *= 0.7
             continue
         kills += 1
-        if (directory / "checkpoint.npz").exists():
+        if _goes_on(directory):
             _assert_finished_steps_are_whole(Run(directory), unbroken)
     _run(directory, mesh)
     _assert_same(Run(directory), unbroken)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("output", [[], ["output.precision=float32"]], ids=["float64", "float32"])
+def test_a_kill_before_each_move_of_a_file(tmp_path, processes, output):
+    """Files take their places one by one; a run that ends between any two goes on."""
+    run_scene(load_scene("bar", [*BAR, *output]), tmp_path / "unbroken")
+    unbroken = Run(tmp_path / "unbroken")
+    for kill_at in count():
+        directory = tmp_path / str(kill_at)
+        process = processes.Process(target=_bar, args=(directory, output, kill_at))
+        process.start()
+        process.join()
+        if process.exitcode == 0:
+            break
+        assert process.exitcode == -signal.SIGKILL
+        if _goes_on(directory):
+            _assert_finished_steps_are_whole(Run(directory), unbroken)
+        process = processes.Process(target=_bar, args=(directory, output))
+        process.start()
+        process.join()
+        assert process.exitcode == 0
+        _assert_same(Run(directory), unbroken)
+    assert kill_at > 4 * 4  # a frame, and a checkpoint that steps aside, for each step at least
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_full_from_some_move_on(tmp_path, monkeypatch):
+    """Also in the midst of a checkpoint's step aside: what was whole stays so, and goes on when there is room."""
+    scene, move, left = load_scene("bar", BAR), os.replace, count()
+    unbroken = run_scene(scene, tmp_path / "unbroken").run
+
+    def replace(*arguments: Any) -> None:
+        if next(left) >= 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        move(*arguments)
+
+    for moves in count():
+        directory, left = tmp_path / str(moves), count(-moves)
+        monkeypatch.setattr(os, "replace", replace)
+        with suppress(WriteError):
+            run_scene(scene, directory)
+            break
+        monkeypatch.undo()
+        if _goes_on(directory):
+            _assert_finished_steps_are_whole(Run(directory), unbroken)
+            resume_run(directory)
+        else:
+            run_scene(scene, directory, overwrite=True)
+        _assert_same(Run(directory), unbroken)
+    assert moves > 4 * 4
 
 
 @pytest.mark.slow

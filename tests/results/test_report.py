@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import qlb
+from qlb.mesh import MeshReport, SurfaceReport
 from qlb.results import Run, RunWriter, finish_run, plot_residuals, write_comparison, write_report
 
 VOID = {"meta", "img", "br", "link", "hr"}
@@ -127,6 +128,31 @@ def test_failed_steps_are_named_with_reasons(make_run):
     good = [line.replace("max_iterations", "converged_relative") if line.startswith("2,") else line for line in lines]
     stats.write_text("\n".join(good) + "\n")
     assert "1 (max iterations), 2 (unknown), 3 to 4 (max iterations)." in Page(write_report(Run(run.directory))).text
+
+
+def test_notes_of_meshing_stand_on_the_page_of_a_run(tmp_path):
+    """Also where the mesh was placed, and once where several bodies have it."""
+    found = SurfaceReport(8, 11, 1, 3, 1, 0, 2, 0, 5, 0)
+    mesh = qlb.TetMesh.box(cells=(2, 1, 1))
+    mesh.report = MeshReport("a<b.obj", found, None, 12, 1, edge=0.1, envelope=1e-3, deviation=2e-2)
+    placed = qlb.Placement(scale=2.0, translation=(5, 0, 0)).of(mesh)
+    bodies = [qlb.Body(m, material=qlb.StableNeoHookean()) for m in (placed, mesh, qlb.TetMesh.box(cells=(1, 1, 1)))]
+    simulation = qlb.Simulation(bodies=bodies[::2], threads=1)
+    RunWriter(tmp_path / "run", {}, simulation).finish("complete")
+    run = Run(tmp_path / "run")
+    (entry,) = run.summary["meshing"]
+    assert entry["facts"]["target edge"] == "0.2 m"  # of the body, twice as large
+    page = Page(write_report(run))
+    assert "Mesh from a<b.obj" in page.text
+    assert "a<b.obj: the surface is open: 3 boundary edges around 1 hole; filling closes them" in page.text
+    assert "at most 2 % of the diagonal" in page.text
+    places = (qlb.Placement(), qlb.Placement(translation=(9, 0, 0)))
+    twice = [qlb.Body(mesh, material=qlb.StableNeoHookean(), placement=place) for place in places]
+    with RunWriter(tmp_path / "two", {}, qlb.Simulation(bodies=twice, threads=1)) as writer:
+        assert len(Run(writer.directory).summary["meshing"]) == 1
+    plain = RunWriter(tmp_path / "plain", {}, qlb.Simulation(bodies=bodies[2:], threads=1)).finish("complete")
+    assert plain["meshing"] == []
+    assert "Mesh from" not in Page(write_report(Run(tmp_path / "plain"))).text
 
 
 def test_a_stopped_run_says_why(tmp_path, make_simulation):

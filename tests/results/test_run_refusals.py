@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -73,7 +74,10 @@ def test_a_folder_that_cannot_be_made(make_simulation):
 def test_overwriting_deletes_only_what_a_run_wrote(make_run, make_simulation, tmp_path):
     directory = make_run(steps=4).directory
     finish_run(directory, picture=False)
-    foreign = ["notes.txt", "frames/notes.txt", "frames/1.npz", "stats.csv.bak"]
+    foreign = ["notes.txt", "frames/notes.txt", "frames/1.npz", "stats.csv.bak", "checkpoint-1.npz"]
+    left = [".checkpoint.part.npz", ".checkpoint.old.npz", "checkpoint-000003.npz", "frames/.000005.part.npz"]
+    for name in left:  # by a kill
+        (directory / name).write_text("a part")
     for name in foreign:
         (directory / name).write_text("precious")
     simulation = make_simulation()
@@ -84,6 +88,7 @@ def test_overwriting_deletes_only_what_a_run_wrote(make_run, make_simulation, tm
     assert run.scene == {"new": True}
     assert list(run.iterations_per_step().steps) == [1]
     assert not (directory / "report.html").exists()
+    assert not any((directory / name).exists() for name in left)
     assert [(directory / name).read_text() for name in foreign] == ["precious"] * len(foreign)
 
 
@@ -164,13 +169,15 @@ def test_a_flipped_byte_is_found(make_run):
 
 
 def test_a_checkpoint_of_another_mesh_is_refused(make_run, make_simulation, tmp_path):
+    """Also where the other run has the same id."""
     mesh = qlb.TetMesh.box(cells=(1, 1, 1))
     other = qlb.Simulation(mesh, material=qlb.StableNeoHookean(), threads=1)
     RunWriter(tmp_path / "other", {}, other)
     run = make_run(steps=1)
     (tmp_path / "other" / "checkpoint.npz").replace(run.directory / "checkpoint.npz")
+    shutil.copy(tmp_path / "other" / "run.json", run.directory)
     with pytest.raises(qlb.InputError, match=r"'positions' has shape \(8, 3\), must be \(20, 3\)"):
-        _ = run.checkpoint
+        _ = Run(run.directory).checkpoint
 
 
 def test_a_missing_frame_is_named(make_run):

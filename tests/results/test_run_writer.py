@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import qlb
-from qlb.results import COLUMNS, Run, RunWriter, WriteError
+from qlb.results import COLUMNS, Run, RunWriter, WriteError, files
+from qlb.results.npz import Packed, pack
 from qlb.timing import PARTS
 
 UNREACHABLE = {"tolerance": qlb.Tolerance(relative=0, absolute=0, scaled=0)}
@@ -101,13 +102,12 @@ def test_summary_counts(tmp_path, make_simulation):
 def test_the_writers_own_time_is_not_counted(tmp_path, make_simulation, monkeypatch):
     simulation = make_simulation()
     writer = RunWriter(tmp_path / "run", {}, simulation)
-    write = np.savez
 
-    def slow(*arguments: Any, **arrays: Any) -> None:
+    def slow(*arguments: Any, **settings: Any) -> Packed:
         sleep(0.05)
-        write(*arguments, **arrays)
+        return pack(*arguments, **settings)
 
-    monkeypatch.setattr(np, "savez", slow)
+    monkeypatch.setattr(files, "pack", slow)
     start = perf_counter()
     for result in simulation.run(3):
         writer.record(result)
@@ -231,13 +231,12 @@ def test_a_full_disk_says_what_is_safe(tmp_path, make_simulation, monkeypatch):
     simulation = make_simulation()
     writer = RunWriter(tmp_path / "run", {}, simulation)
     writer.record(simulation.advance())
-    write = np.savez
 
-    def full(file: Any, **arrays: Any) -> None:
-        file.write(b"some of it")
+    def some_of_it() -> Iterator[bytes]:
+        yield b"some of it"
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(np, "savez", full)
+    monkeypatch.setattr(files, "pack", lambda *arguments, **settings: Packed(some_of_it(), {}))
     with pytest.raises(WriteError) as caught:
         writer.record(simulation.advance())
     message = str(caught.value)
@@ -246,7 +245,7 @@ def test_a_full_disk_says_what_is_safe(tmp_path, make_simulation, monkeypatch):
     assert "\n" not in message
     assert Run(tmp_path / "run").frame_steps == [0, 1]
     assert not list(tmp_path.rglob(".*"))
-    monkeypatch.setattr(np, "savez", write)
+    monkeypatch.setattr(files, "pack", pack)
     assert writer.finish("failed", message)["steps"] == 2
     assert Run(tmp_path / "run").frame_steps == [0, 1, 2]
 
@@ -262,7 +261,7 @@ def test_the_summary_is_strict_json(make_run):
 
 def test_nothing_else_lies_in_a_run_directory(make_run):
     run = make_run(steps=1)
-    names = {path.relative_to(run.directory) for path in run.directory.rglob("*") if path.is_file()}
-    files = ["run.json", "scene.yaml", "mesh.npz", "materials.npz", "stats.csv", "checkpoint.npz", "summary.json"]
-    files += ["run.lock"]
-    assert names == {*map(Path, files), Path("frames/000000.npz"), Path("frames/000001.npz")}
+    found = {path.relative_to(run.directory) for path in run.directory.rglob("*") if path.is_file()}
+    names = ["run.json", "scene.yaml", "mesh.npz", "materials.npz", "stats.csv", "checkpoint.npz", "summary.json"]
+    names += ["run.lock"]
+    assert found == {*map(Path, names), Path("frames/000000.npz"), Path("frames/000001.npz")}

@@ -18,6 +18,8 @@ export interface Plot {
   traces: Settings[];
   axes: Record<string, Settings>;
   layout: Settings;
+  /** where the legend is, if not above */
+  legendAt?: Settings;
 }
 
 const BLUE = "#2b8fd0";

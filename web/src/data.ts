@@ -87,6 +87,44 @@ export interface History {
   angularMomentum: number[][];
 }
 
+/** One combination of values; null where it has no run. */
+export interface SweepCase {
+  name: string;
+  /** in the order of the keys, as they were written */
+  values: string[];
+  /** whether all its steps converged */
+  good: boolean;
+  /** nonlinear iterations a step */
+  mean: number | null;
+  max: number | null;
+  factorizations: number | null;
+  /** [s] */
+  cpu: number | null;
+}
+
+export interface Sweep {
+  keys: string[];
+  cases: SweepCase[];
+}
+
+/** One run in a figure. */
+export interface Panel {
+  /** a curve for each stage of the integrator, two at most */
+  stages: Curve[];
+  failed: { steps: number[]; values: number[] };
+  /** its mean and maximum */
+  counts: string;
+  /** how many steps failed, if any */
+  trouble: string;
+}
+
+/** Rows are a variation, columns the solvers. */
+export interface FigureData {
+  number: number;
+  solvers: string[];
+  rows: { label: string; panels: (Panel | null)[] }[];
+}
+
 export interface PageData {
   /** sRGB bytes of the colours from low to high, base64 */
   palette: string;
@@ -96,6 +134,10 @@ export interface PageData {
   charts: { label: string; charts: Charts }[];
   /** whether a server sends more */
   live: boolean;
+  /** of the page of a sweep, which has nothing else */
+  sweep?: Sweep;
+  /** of the page of figures, which has nothing else */
+  figures?: FigureData[];
 }
 
 /** What the server of a live run answers. */

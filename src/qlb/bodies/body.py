@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,6 +52,8 @@ class Placement:
         if self.scale == 1 and not any(self.rotation) and not any(self.translation):
             return mesh
         placed = TetMesh(self.moved(mesh.positions, centre_of_volume(mesh)), mesh.tets, regions=mesh.regions)
+        if mesh.report is not None:
+            placed.report = replace(mesh.report, edge=self.scale * mesh.report.edge)
         return placed.with_surface(mesh.surface)
 
     def moved(self, x: FloatArray, centre: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from rich.table import Table
 
 from qlb.cli.output import console, errors
 from qlb.errors import InputError
-from qlb.mesh import MeshQuality, MeshReport, SurfaceReport, TetMesh
+from qlb.mesh import MeshQuality, SurfaceReport, TetMesh
 from qlb.mesh.files import MeshFile
 from qlb.mesh.filling import fill
 from qlb.mesh.surface import repair
@@ -71,11 +72,9 @@ def scaled(file: MeshFile, scale: float | None, height: float | None) -> MeshFil
 def _print_tets(source: Path, mesh: TetMesh) -> None:
     table = _table(source.name)
     if mesh.report is not None:
-        _add_surface(table, mesh.report.found)
-        _add_filling(table, mesh.report)
+        _add_rows(table, mesh.report.rows())
         table.add_section()
-    for name, value in MeshQuality.of(mesh).rows():
-        table.add_row(name, value)
+    _add_rows(table, MeshQuality.of(mesh).rows())
     if mesh.regions is not None:
         table.add_row("regions", f"{len(np.unique(mesh.regions))}")
     console.print(table)
@@ -83,7 +82,7 @@ def _print_tets(source: Path, mesh: TetMesh) -> None:
 
 def _print_surface(source: Path, found: SurfaceReport, size: list[float]) -> None:
     table = _table(source.name)
-    _add_surface(table, found)
+    _add_rows(table, found.rows())
     table.add_row("size", " x ".join(f"{length:.4g}" for length in size) + " m")
     console.print(table)
     for note in found.notes():
@@ -94,11 +93,6 @@ def _table(name: str) -> Table:
     return Table("", escape(name), show_header=True, title_justify="left")
 
 
-def _add_surface(table: Table, found: SurfaceReport) -> None:
-    for name, value in found.rows():
+def _add_rows(table: Table, rows: Sequence[tuple[str, str]]) -> None:
+    for name, value in rows:
         table.add_row(name, value)
-
-
-def _add_filling(table: Table, report: MeshReport) -> None:
-    table.add_row("target edge", f"{report.edge:.3g} m")
-    table.add_row("off the tets' boundary", f"at most {100 * report.deviation:.2g} % of the diagonal")

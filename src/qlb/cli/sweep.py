@@ -69,4 +69,5 @@ def _print_table(result: Sweep, keys: Sequence[str]) -> None:
         if row["error"]:
             errors.print(f"[bold red]{row['status']}:[/] {escape(row['case'] + ': ' + row['error'])}", soft_wrap=True)
     console.print("mean, max: nonlinear iterations a step", soft_wrap=True)
-    console.print(f"table       {escape(str(result.table))}", soft_wrap=True, highlight=False)
+    for name, path in {"table": result.table, "report": result.page}.items():
+        console.print(f"{name:<11} {escape(str(path))}", soft_wrap=True, highlight=False)

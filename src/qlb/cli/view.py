@@ -14,7 +14,7 @@ _MADE_FROM = (layout.SUMMARY, layout.STATS)
 
 
 def view(directory: Path, *, show: bool) -> None:
-    """Print where the page of a run, a comparison or figures lies, and open it; that of a run is made where it is old.
+    """Print where the page of a run or a study lies, and open it; that of a run is made where it is old.
 
     Raises:
         InputError: there is no page in the folder, and it is not a run.
@@ -32,7 +32,7 @@ def _page(directory: Path) -> Path:
         found = next((page for page in pages if page.is_file()), None)
         if found is None:
             raise InputError(
-                f"{directory} is not a run, a comparison or figures of qlb: it has no {layout.MARKER} or page"
+                f"{directory} is not a run, a comparison, a sweep or figures of qlb: it has no {layout.MARKER} or page"
             )
         return found
     run, page = Run(directory), pages[0]

@@ -1,6 +1,6 @@
 """Runs in the formats of other tools. Each format is a module here, and a line in `formats`."""
 
-from qlb.export.formats import FORMATS, Exported, export_run
+from qlb.export.formats import FORMATS, Exported, export_run, remove_exports
 from qlb.export.glb import write_glb
 from qlb.export.obj import write_obj
 from qlb.export.ply import write_ply
@@ -15,6 +15,7 @@ __all__ = [
     "Exported",
     "Recording",
     "export_run",
+    "remove_exports",
     "write_gif",
     "write_glb",
     "write_mp4",

@@ -93,6 +93,27 @@ def export_run(
     return Exported(chosen.name, files, len(recording.steps), _notes(recording, chosen))
 
 
+def remove_exports(directory: Path) -> None:
+    """Delete what `export_run` left in the default folder of a run directory, known by its names, and nothing else.
+
+    Raises:
+        WriteError: a file could not be deleted.
+    """
+    folder, name = directory / FOLDER, directory.resolve().name
+    if not folder.is_dir():
+        return
+    paths = [(format, folder / f"{name}{suffix}") for format in FORMATS.values() for suffix in format.suffixes]
+    files = {file for format, path in paths for file in format.files(path)}
+    try:
+        for file in files:
+            file.unlink(missing_ok=True)
+        for place in ({file.parent for file in files} - {folder}, {folder}):
+            for empty in (each for each in place if each.is_dir() and not any(each.iterdir())):
+                empty.rmdir()
+    except OSError as error:
+        raise WriteError(folder, error.strerror or str(error)) from None
+
+
 def _chosen(name: str | None, out: Path | None) -> Format:
     """The format by its name, or by the suffix of the output."""
     if name is not None:

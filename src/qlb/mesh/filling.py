@@ -79,6 +79,14 @@ class MeshReport:
             )
         return [f"{self.name}: {note}" for note in notes]
 
+    def rows(self) -> list[tuple[str, str]]:
+        """What was found and made, and its value, to be printed."""
+        return [
+            *self.found.rows(),
+            ("target edge", f"{self.edge:.3g} m"),
+            ("off the tets' boundary", f"at most {100 * self.deviation:.2g} % of the diagonal"),
+        ]
+
 
 def load(path: Path, *, edge: float | None, tets: int | None) -> TetMesh:
     """The tets of a file, or those that fill its surface; see `TetMesh.load`."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from qlb.results.picture import render_frames
     from qlb.results.plots import plot_contact, plot_iterations, plot_residuals, plot_seconds
     from qlb.results.report import finish_run, write_comparison, write_report
+    from qlb.results.sweep_page import write_sweep_page
 
 # What draws is imported when it is first asked for: matplotlib takes as long as all the rest.
 _DRAWS = {
@@ -26,6 +27,7 @@ _DRAWS = {
     "picture": ("render_frames",),
     "plots": ("plot_contact", "plot_iterations", "plot_residuals", "plot_seconds"),
     "report": ("finish_run", "write_comparison", "write_report"),
+    "sweep_page": ("write_sweep_page",),
 }
 
 __all__ = [
@@ -50,6 +52,7 @@ __all__ = [
     "write_figure",
     "write_figures_page",
     "write_report",
+    "write_sweep_page",
 ]
 
 

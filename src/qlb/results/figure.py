@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from qlb.results.run import Run
+from qlb.results.run import Run, StepIterations
 
 CSV_COLUMNS = ("figure", "row", "solver", "step", "stage", "iterations", "converged")
 """Columns of the file behind a figure: one row for each stage of each time step."""
@@ -70,6 +70,27 @@ def grid_csv(grid: FigureGrid) -> str:
     for label, solver, run in grid.cells():
         writer.writerows((grid.number, label, solver, *row) for row in (_stage_rows(run) if run else []))
     return text.getvalue()
+
+
+def stage_curves(run: Run) -> list[StepIterations]:
+    """Iterations by step, one curve for each stage of the integrator.
+
+    A first step by SDIRK2, with which BDF2 starts, does not make two curves: both its stages count in one.
+    """
+    if run.stages == 1:
+        return [run.iterations_per_step()]
+    return [run.iterations_per_step(stage) for stage in range(1, run.stages + 1)]
+
+
+def words_on(run: Run) -> tuple[str, str]:
+    """What stands in the panel of a run: its counts, and what went wrong, if anything."""
+    s = run.summary
+    failed, trouble = len(s["failed_steps"]), ""
+    if s["status"] == "failed":
+        trouble = f"stopped after step {s['steps']}"
+    elif failed:
+        trouble = f"{failed} of {s['steps']} failed"
+    return f"mean {s['iterations_mean']:.3g}, max {s['iterations_max']}", trouble
 
 
 def _stage_rows(run: Run) -> Iterator[tuple[int, int, int, str]]:

@@ -13,7 +13,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from qlb.results import style
-from qlb.results.figure import FORMATS, FigureGrid, grid_csv
+from qlb.results.figure import FORMATS, FigureGrid, grid_csv, stage_curves, words_on
 from qlb.results.files import write_text
 from qlb.results.plots import LOGARITHMIC
 from qlb.results.run import Run, StepIterations
@@ -46,7 +46,7 @@ def draw_grid(grid: FigureGrid) -> Figure:
         column[0].set_title(solver, loc="center")
         column[-1].set_xlabel("time step")
         runs = [run for _, name, run in grid.cells() if name == solver and run]
-        _scale(column[0], [curve for run in runs for curve in _curves(run)])
+        _scale(column[0], [curve for run in runs for curve in stage_curves(run)])
     for ax, label in zip(axes[:, 0], grid.runs, strict=True):
         ax.set_ylabel(label, fontweight="bold", labelpad=8)
     figure.supylabel("nonlinear iterations a step", fontsize=10)
@@ -55,21 +55,11 @@ def draw_grid(grid: FigureGrid) -> Figure:
     return figure
 
 
-def _curves(run: Run) -> list[StepIterations]:
-    """Iterations by step, one curve for each stage of the integrator.
-
-    A first step by SDIRK2, with which BDF2 starts, does not make two curves: both its stages count in one.
-    """
-    if run.stages == 1:
-        return [run.iterations_per_step()]
-    return [run.iterations_per_step(stage) for stage in range(1, run.stages + 1)]
-
-
 def _draw_panel(ax: Axes, run: Run | None) -> None:
     if run is None:
         ax.text(0.5, 0.5, "no run", transform=ax.transAxes, ha="center", va="center", color=style.FAINT)
         return
-    curves = _curves(run)
+    curves = stage_curves(run)
     looks = ((style.BLUE, 1.3),) if len(curves) == 1 else ((style.BLUE, 2.0), (style.RED, 1.0))
     for curve, (colour, width) in zip(curves, looks, strict=True):
         marker = "o" if len(curve.steps) < 3 else ""
@@ -93,13 +83,10 @@ def _mark_failed(ax: Axes, curves: list[StepIterations]) -> None:
 
 
 def _write_counts(ax: Axes, run: Run) -> None:
-    s = run.summary
-    _write(ax, f"mean {s['iterations_mean']:.3g}, max {s['iterations_max']}", "left", style.INK)
-    failed = len(s["failed_steps"])
-    if s["status"] == "failed":
-        _write(ax, f"stopped after step {s['steps']}", "right", style.RED)
-    elif failed:
-        _write(ax, f"{failed} of {s['steps']} failed", "right", style.RED)
+    counts, trouble = words_on(run)
+    _write(ax, counts, "left", style.INK)
+    if trouble:
+        _write(ax, trouble, "right", style.RED)
 
 
 def _write(ax: Axes, text: str, side: Literal["left", "right"], colour: str) -> None:

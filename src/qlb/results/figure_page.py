@@ -1,4 +1,4 @@
-"""One page with figures in a grid, the numbers of each and what to expect; needs neither network nor scripts."""
+"""One page with figures in a grid, the numbers of each and what to expect; needs no network."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from qlb.results.figure import PAGE, FigureGrid
 from qlb.results.files import write_text
+from qlb.results.page import figures_content, page_scripts
 from qlb.results.report import data_uri, template
 from qlb.results.run import Run
 from qlb.results.wording import Verdict, common, flatten
@@ -71,12 +72,15 @@ def write_figures_page(
         WriteError: the file could not be written.
     """
     runs = [run for grid in grids for _, _, run in grid.cells() if run]
+    scripts = page_scripts(("plots",))
     context = {
         "title": "The supplement's figures, redrawn",
         "verdict": _verdict(grids, problems),
         "problems": problems,
         "notes": notes,
-        "figures": [_figure(grid, directory) for grid in grids],
+        "figures": [_figure(grid, directory, moving=scripts is not None) for grid in grids],
+        "scripts": scripts,
+        "content": figures_content(grids),
         "has_findings": any(grid.findings for grid in grids),
         "settings": common([flatten(run.scene) for run in runs]) if runs else {},
         "versions": common([run.summary["versions"] for run in runs]) if runs else {},
@@ -86,13 +90,14 @@ def write_figures_page(
     return path
 
 
-def _figure(grid: FigureGrid, directory: Path) -> dict[str, object]:
-    rows = figure_rows(grid)
+def _figure(grid: FigureGrid, directory: Path, *, moving: bool) -> dict[str, object]:
+    """What the page says of a figure; its image stands in the page where nothing draws it there."""
+    rows, image = figure_rows(grid), f"figure-{grid.number}.png"
     return {
         "number": grid.number,
         "title": grid.title,
         "parameter": grid.parameter,
-        "image": data_uri(directory / f"figure-{grid.number}.png"),
+        "image": image if moving else data_uri(directory / image),
         "alt": f"Nonlinear iterations over time steps of {', '.join(grid.solvers)}; rows: {', '.join(grid.runs)}",
         "expectation": grid.expectation,
         "findings": grid.findings,

@@ -11,16 +11,24 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.npyio import NpzFile
 
 from qlb.errors import InputError
 from qlb.results.errors import WriteError
+from qlb.results.npz import SUFFIX, pack
 
 Arrays = dict[str, npt.NDArray[Any]]
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, aside: bool = False) -> Iterator[Path]:
     """A path to write to; what was written there takes the place of `path` at the end, and goes away on an error.
+
+    Args:
+        path: the file.
+        aside: let the old file step aside (`aside_name`) until the new one is in its place. Some file systems (ext4)
+            wait for the disk where a file that was just written takes the place of another; this way they do not.
+            A kill may leave the old one there: read `whole_file(path)`.
 
     Raises:
         WriteError: the system could not write.
@@ -28,13 +36,40 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = temporary_name(path)
     try:
         yield temporary
-        os.replace(temporary, path)
+        if aside:
+            _replace_stepping_aside(temporary, path)
+        else:
+            os.replace(temporary, path)
     except OSError as error:
         _remove(temporary)
         raise WriteError(path, error.strerror or str(error)) from None
     except BaseException:
         _remove(temporary)
         raise
+
+
+def _replace_stepping_aside(new: Path, path: Path) -> None:
+    old = aside_name(path)
+    with suppress(FileNotFoundError):
+        os.replace(path, old)
+    try:
+        os.replace(new, path)
+    except BaseException:
+        with suppress(FileNotFoundError):
+            os.replace(old, path)
+        raise
+    _remove(old)
+
+
+def aside_name(path: Path) -> Path:
+    """Where `path` may lie while another takes its place."""
+    return path.with_name(f".{path.stem}.old{path.suffix}")
+
+
+def whole_file(path: Path) -> Path:
+    """Where to read `path`, which `replacing` writes: stepped aside, where a kill came just then."""
+    old = aside_name(path)
+    return old if not path.exists() and old.exists() else path
 
 
 def temporary_name(path: Path) -> Path:
@@ -48,23 +83,38 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_arrays(path: Path, arrays: Mapping[str, npt.ArrayLike], *, compress: bool = False) -> None:
-    """Write named arrays as an npz file, whose members carry a CRC-32. Raises `WriteError`."""
-    save = np.savez_compressed if compress else np.savez
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        save(file, allow_pickle=False, **{name: np.asarray(array) for name, array in arrays.items()})
+def write_arrays(
+    path: Path, arrays: Mapping[str, npt.ArrayLike], *, compress: bool = False, aside: bool = False
+) -> dict[str, int]:
+    """Write named arrays as an npz file; returns the CRC-32 that each has in it.
+
+    Args:
+        path: the file.
+        arrays: what to write.
+        compress: deflate them.
+        aside: as of `replacing`.
+
+    Raises:
+        WriteError: the system could not write.
+    """
+    packed = pack(arrays, compress=compress)
+    with replacing(path, aside=aside) as temporary, temporary.open("wb") as file:
+        file.writelines(packed.chunks)
+    return packed.crc
 
 
 def append_text(path: Path, text: str) -> None:
     """Add to a text file, all of `text` or, on an error, nothing. Raises `WriteError`."""
+    left = text.encode()
     try:
-        size = path.stat().st_size if path.exists() else 0
-        try:
-            with path.open("a", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-        except BaseException:
-            os.truncate(path, size)
-            raise
+        with path.open("ab", buffering=0) as file:
+            size = file.tell()
+            try:
+                while left:
+                    left = left[file.write(left) :]
+            except BaseException:
+                file.truncate(size)
+                raise
     except OSError as error:
         raise WriteError(path, error.strerror or str(error)) from None
 
@@ -79,16 +129,39 @@ def read_arrays(path: Path, needed: Mapping[str, tuple[int | None, ...]]) -> Arr
     Raises:
         InputError: the file is missing or damaged, or one of `needed` is missing or has another shape.
     """
+    with _reading(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    require_shapes(path, arrays, needed)
+    return arrays
+
+
+def read_checked(path: Path, crc: Mapping[str, int]) -> Arrays:
+    """Those arrays of an npz file that `crc` names, if each is the one with that CRC-32 (`write_arrays`).
+
+    Raises:
+        InputError: the file is missing or damaged, or one of the arrays is missing or another one.
+    """
+    with _reading(path) as archive:
+        assert archive.zip is not None
+        found = {name.removesuffix(SUFFIX): archive.zip.getinfo(name).CRC for name in archive.zip.namelist()}
+        other = [name for name in crc if found.get(name) != crc[name]]
+        arrays = {} if other else {name: archive[name] for name in crc}
+    if other:
+        raise InputError(f"{path} is not what it should be: its '{other[0]}' is missing or another one")
+    return arrays
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[NpzFile]:
+    """An open npz file. What goes wrong with it in the block becomes an `InputError`."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+            yield archive
     except FileNotFoundError:
         raise InputError(f"{path} does not exist") from None
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path} is damaged or not an npz file: {reason}") from None
-    require_shapes(path, arrays, needed)
-    return arrays
 
 
 def require_shapes(path: Path, arrays: Arrays, needed: Mapping[str, tuple[int | None, ...]]) -> None:

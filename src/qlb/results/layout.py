@@ -17,7 +17,10 @@ Format version 1::
                         (p, 3), and contact_energy [J]; gravity [m/s^2] (3,); load_energy [J] where there are loads;
                         named by the step
     stats.csv           one row per nonlinear iteration, columns as in `qlb.results.COLUMNS`
-    checkpoint.npz      what a run needs to go on to the same bits, as of the last frame; with the id of the run
+    checkpoint.npz      what a run needs to go on to the same bits, as of the last frame: run (its id), step, seconds,
+                        state and solver; elsewhere (k, 4) names what lies in frames and in the next files, instead of
+                        repeating it: name, file, name there, CRC-32
+    checkpoint-000012.npz  what was new in the checkpoint of that step, large and in no frame; goes when no longer named
     summary.json        the run in numbers; its status is "running" until the end
     run.lock            held by the process that writes; left behind, and empty
     *.png, report.html  made from the above by `finish_run`
@@ -31,7 +34,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from uuid import uuid4
@@ -39,7 +42,7 @@ from uuid import uuid4
 from filelock import FileLock, Timeout
 
 from qlb.errors import InputError
-from qlb.results.files import temporary_name
+from qlb.results.files import aside_name, temporary_name
 
 FORMAT = "qlb run"
 VERSION = 1
@@ -51,6 +54,7 @@ MATERIALS = "materials.npz"
 FRAMES = "frames"
 STATS = "stats.csv"
 CHECKPOINT = "checkpoint.npz"
+CHECKPOINT_PART = "checkpoint-"
 SUMMARY = "summary.json"
 LOCK = "run.lock"
 REPORT = "report.html"
@@ -58,6 +62,9 @@ FIGURES = {name: f"{name}.png" for name in ("picture", "iterations", "residuals"
 """Images of a run, by the name that `finish_run` gives them, in the order of the report."""
 
 _FRAME = re.compile(r"(\d{6,})\.npz")
+_FRAME_LEFT = re.compile(r"\.\d{6,}\.part\.npz")
+"""A frame that a kill cut off."""
+_PART = re.compile(rf"\.?{CHECKPOINT_PART}\d{{6,}}(\.part)?\.npz")
 
 
 def frame_path(directory: Path, step: int) -> Path:
@@ -70,6 +77,18 @@ def frame_steps(directory: Path) -> list[int]:
     folder = directory / FRAMES
     names = os.listdir(folder) if folder.is_dir() else []
     return sorted(int(match[1]) for name in names if (match := _FRAME.fullmatch(name)))
+
+
+def checkpoint_part(directory: Path, step: int) -> Path:
+    """Where that of the checkpoint of a step lies which neither it nor a frame holds."""
+    return directory / f"{CHECKPOINT_PART}{step:06d}.npz"
+
+
+def remove_checkpoint_parts(directory: Path, keep: Collection[str]) -> None:
+    """Delete those files beside the checkpoint whose names are not in `keep`."""
+    for name in os.listdir(directory):
+        if _PART.fullmatch(name) and name not in keep:
+            (directory / name).unlink(missing_ok=True)
 
 
 def check_marker(directory: Path) -> str:
@@ -164,12 +183,18 @@ def remove_frames_after(directory: Path, step: int) -> None:
 
 def _clear(directory: Path) -> None:
     """Delete what a run wrote and nothing else; the marker last, so that what is left stays known as a run."""
+    remove_checkpoint_parts(directory, keep=())
     for path in _files(directory):
         path.unlink(missing_ok=True)
-        temporary_name(path).unlink(missing_ok=True)
+        for left in (temporary_name(path), aside_name(path)):
+            left.unlink(missing_ok=True)
     frames = directory / FRAMES
-    if frames.is_dir() and not any(frames.iterdir()):
-        frames.rmdir()
+    if frames.is_dir():
+        for path in frames.iterdir():
+            if _FRAME_LEFT.fullmatch(path.name):
+                path.unlink()
+        if not any(frames.iterdir()):
+            frames.rmdir()
     (directory / MARKER).unlink()
 
 

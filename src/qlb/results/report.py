@@ -106,6 +106,7 @@ def report_context(run: Run, missing: Mapping[str, str]) -> dict[str, Any]:
         "images": images,
         "settings": flatten(run.scene),
         "statistics": statistics(run.summary),
+        "meshing": run.summary.get("meshing", []),
         "versions": run.summary["versions"],
         "files": [layout.STATS, layout.SUMMARY, layout.SCENE],
     }
@@ -168,12 +169,15 @@ def write_comparison(
 def _table_row(row: Mapping[str, object], runs: Mapping[str, Run], directory: Path) -> dict[str, Any]:
     label, *values = row.values()
     run = runs.get(str(label))
-    link = None
-    if run is not None and (run.directory / layout.REPORT).exists():
-        relative = os.path.relpath(run.directory / layout.REPORT, directory)
-        link = quote(Path(relative).as_posix())
+    link = None if run is None else link_to(run, directory)
     cells = [f"{value:.3g}" if isinstance(value, float) else short(value) for value in values]
     return {"label": str(label), "link": link, "cells": cells}
+
+
+def link_to(run: Run, directory: Path) -> str | None:
+    """The report of a run, where it has one, as seen from a page in `directory`."""
+    report = run.directory / layout.REPORT
+    return quote(Path(os.path.relpath(report, directory)).as_posix()) if report.exists() else None
 
 
 def _images(run: Run, missing: Mapping[str, str]) -> list[dict[str, str | None]]:

@@ -187,11 +187,7 @@ class Run:
     @cached_property
     def checkpoint(self) -> Checkpoint:
         """What the run needs to go on from its last finished step."""
-        path = self.directory / layout.CHECKPOINT
-        checkpoint = Checkpoint.read(path, self.parts.nodes)
-        if checkpoint.run != self.id:
-            raise InputError(f"{path} is the checkpoint of another run: {checkpoint.run!r}, must be {self.id!r}")
-        return checkpoint
+        return Checkpoint.read(self.directory, self.id, self.parts.nodes)
 
     def restore(self, simulation: Simulation) -> None:
         """Set a simulation, set up as that of the run was, to where the checkpoint is.

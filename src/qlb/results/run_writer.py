@@ -21,7 +21,7 @@ from qlb.analysis.snapshot import load_energy
 from qlb.contact import ContactReport
 from qlb.errors import InputError
 from qlb.results import layout
-from qlb.results.checkpoint import Checkpoint
+from qlb.results.checkpoint import Checkpoint, CheckpointWriter, Place
 from qlb.results.clock import LoopClock
 from qlb.results.errors import WriteError
 from qlb.results.files import Arrays, append_text, write_arrays, write_text
@@ -91,7 +91,7 @@ class RunWriter:
         self._now = Checkpoint.of(simulation)
         self._lock = layout.lock(self.directory) if resume else layout.claim(self.directory, overwrite=overwrite)
         try:
-            self._id = layout.check_marker(self.directory)
+            self._checkpoints = CheckpointWriter(self.directory, layout.check_marker(self.directory))
             earlier = take_up(self.directory, simulation) if resume else None
             self._clock = LoopClock(simulation.timer, None if earlier is None else earlier.seconds)
             with self._clock.stopped():
@@ -197,8 +197,11 @@ class RunWriter:
             arrays["contact_energy"] = np.array(self._contact.energy)
             arrays |= {"plane_forces": self._contact.plane_forces} if planes else {}
         arrays |= {"step": np.array(step), "time": np.array(state.time)}
-        write_arrays(layout.frame_path(self.directory, step), arrays, compress=self._compress)
-        replace(self._now, seconds=self._clock.saved(), run=self._id).write(self.directory / layout.CHECKPOINT)
+        path = layout.frame_path(self.directory, step)
+        crc = write_arrays(path, arrays, compress=self._compress)
+        file = path.relative_to(self.directory).as_posix()
+        exact = [(frame[name], Place(file, name, crc[name])) for name in frame if arrays[name] is frame[name]]
+        self._checkpoints.write(replace(self._now, seconds=self._clock.saved()), exact)
         self._kept = step
 
     def _write_summary(self, status: Status, error: str | None) -> dict[str, Any]:
@@ -232,6 +235,7 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
         "threads": simulation.threads,
         "tolerance": simulation.tolerance.model_dump(mode="json"),
         "contact": None if contact is None else contact.resolved(),
+        "meshing": _meshing(simulation),
         "versions": {
             "qlb": version("qlb"),
             "python": platform.python_version(),
@@ -240,6 +244,13 @@ def _facts(simulation: Simulation) -> dict[str, Any]:
             "simd": _native.simd_levels()[-1],
         },
     }
+
+
+def _meshing(simulation: Simulation) -> list[dict[str, Any]]:
+    """How meshes were made from surfaces, each once however many bodies have it."""
+    reports = [body.mesh.report for body in simulation.assembly.bodies if body.mesh.report is not None]
+    by_name = {report.name: report for report in reports}
+    return [{"name": name, "facts": dict(r.rows()), "notes": r.notes()} for name, r in by_name.items()]
 
 
 def _scene_text(scene: Mapping[str, object]) -> str:

@@ -43,7 +43,7 @@ def run_scene(
     Args:
         scene: what to run.
         directory: where; made, and refused if it holds anything.
-        overwrite: replace an earlier run there.
+        overwrite: replace an earlier run there, with its exports.
         on_start: called with the directory when it holds the first frame.
         on_step: called after each step, the failed one included.
         stop: asked before each step whether to end early.
@@ -57,6 +57,10 @@ def run_scene(
     writer = RunWriter(
         directory, scene.model_dump(mode="json"), simulation, overwrite=overwrite, **scene.output.model_dump()
     )
+    if overwrite:
+        from qlb.export import remove_exports
+
+        remove_exports(directory)
     return _record(writer, simulation, scene.steps, on_start, on_step, stop)
 
 

@@ -12,9 +12,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from qlb import results
 from qlb.errors import InputError
-from qlb.results import Run
+from qlb.results import Run, layout
 from qlb.results.files import write_text
+from qlb.results.wording import flatten
 from qlb.scenes import Scene, load_scene
 from qlb.scenes.overrides import split_values
 from qlb.studies.cluster import run_on_cluster
@@ -37,7 +39,7 @@ COUNTS = (
 TIMINGS = ("wall_seconds", "cpu_seconds")
 """Columns that are not."""
 
-_KIND = StudyKind("qlb sweep", "sweep.json", [TABLE])
+_KIND = StudyKind("qlb sweep", "sweep.json", [TABLE, layout.REPORT])
 _FIXED = ("threads=1",)
 
 Row = dict[str, Any]
@@ -88,6 +90,11 @@ class Sweep:
         return self.directory / TABLE
 
     @property
+    def page(self) -> Path:
+        """The report page."""
+        return self.directory / layout.REPORT
+
+    @property
     def converged(self) -> bool:
         """Whether every step of every case converged."""
         return all(row["status"] == "complete" and row["converged"] == "true" for row in self.rows)
@@ -134,7 +141,7 @@ def sweep(
     on_update: Callable[[Update], None] = lambda update: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Sweep:
-    """Run the cases that are not there yet, and write sweep.csv.
+    """Run the cases that are not there yet, and write sweep.csv and report.html.
 
     A case whose run lies there with the same settings, from start to end or to a step that failed, is taken as it is.
     One that fails is a row that says so, and the others go on.
@@ -175,7 +182,16 @@ def sweep(
         return Sweep(plan.directory, [], interrupted=True)
     result = Sweep(plan.directory, [_row(member, ends.get(member.name)) for member in plan.members])
     write_text(result.table, _table(result.rows))
+    _write_page(plan, result)
     return result
+
+
+def _write_page(plan: SweepPlan, result: Sweep) -> None:
+    rows = {row["case"]: row for row in result.rows}
+    runs = {case.name: run for case in plan.cases if rows[case.name]["steps"] != "" and (run := run_of(case))}
+    (settings,) = plan.bases.values()
+    keys = list(plan.members[0].values)
+    results.write_sweep_page(result.rows, keys, runs, plan.directory, flatten(settings))
 
 
 def _parsed(text: str) -> tuple[str, list[str]]:
