@@ -6,7 +6,7 @@ set -eu
 cd "$(dirname "$0")/.."
 work=build/coverage
 export COVERAGE_FILE="$PWD/$work/python.data"
-scripts/instrumented_build.sh coverage "-O1 --coverage -fprofile-update=prefer-atomic" -DQLB_CHOLMOD=ON
+scripts/instrumented_build.sh coverage "-O1 --coverage -fprofile-update=prefer-atomic"
 find "$work/native" -name '*.gcda' -delete
 [ $# -gt 0 ] || set -- -n 2 -m "not slow"
 
