@@ -6,7 +6,7 @@ set -eu
 cd "$(dirname "$0")/.."
 work=build/coverage
 export COVERAGE_FILE="$PWD/$work/python.data"
-scripts/instrumented_build.sh coverage "-O1 --coverage -fprofile-update=prefer-atomic"
+scripts/instrumented_build.sh coverage "-O1 --coverage -fprofile-update=prefer-atomic -fprofile-filter-files=/native/"
 find "$work/native" -name '*.gcda' -delete
 [ $# -gt 0 ] || set -- -n 2 -m "not slow"
 
