@@ -155,6 +155,7 @@ def test_failed_step_gives_exit_status_1_and_keeps_what_is_done(qlb, tmp_path):
     assert (tmp_path / "out" / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_shown_scene_runs_and_is_the_same_scene(qlb, tmp_path):
     _, text, _ = qlb("scenes", "--show", "bar")
     (tmp_path / "mine.yaml").write_text(text)
@@ -164,6 +165,7 @@ def test_shown_scene_runs_and_is_the_same_scene(qlb, tmp_path):
     assert (tmp_path / "a" / "stats.csv").read_text() != ""
 
 
+@pytest.mark.slow
 def test_a_run_keeps_its_loads_in_its_scene_file(qlb, tmp_path):
     loads = ["loads.pressure=[{faces: y > 0.24, value: 100 * t}]", "loads.gravity=0,-9.81 * t,0"]
     sets = [word for load in loads for word in ("--set", load)]
@@ -197,6 +199,7 @@ def test_doctor_is_content(qlb):
     assert "METIS" in out
 
 
+@pytest.mark.slow
 def test_compare_writes_one_table_and_one_plot(qlb, tmp_path):
     solvers = "ND,ND:projection=on-demand,QLB"
     status, out, _ = qlb("compare", "bar", *SMALL, "--solvers", solvers, "--out", "out")

@@ -48,8 +48,7 @@ SCENARIOS = {
 }
 
 
-FAST = ("released", "scripted")
-MARKED = [pytest.param(s, id=n, marks=() if n in FAST else pytest.mark.slow) for n, s in SCENARIOS.items()]
+MARKED = [pytest.param(s, id=n, marks=() if n == "released" else pytest.mark.slow) for n, s in SCENARIOS.items()]
 
 
 def bent(x: Array) -> Array:
@@ -127,6 +126,7 @@ def test_order(scenario: Scenario, integrator: str, what: str) -> None:
 
 
 # Scripted positions are exact at every stage, from which SDIRK2, of stage order 1, infers velocities to order 1.
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "order"), [("BDF1", 0.95), ("BDF2", 1.9), ("SDIRK2", 0.95)])
 def test_order_of_the_velocities_of_scripted_nodes(integrator: str, order: float) -> None:
     counts, moved = COUNTS[integrator], right_end(MESH)
