@@ -23,7 +23,7 @@ thread)
   command -v "$CXX" >/dev/null || { echo "Needed: apt-get install clang-14 libomp-14-dev libclang-rt-14-dev" >&2; exit 1; }
   scripts/instrumented_build.sh thread "$frames -fsanitize=thread"
   preload=$(gcc -print-file-name=libtsan.so)  # that of LLVM 14 cannot be preloaded; the interface is one
-  tests="tests/system/test_threads.py tests/contact/test_repeatability.py tests/contact/test_candidates.py
+  tests="tests/linalg tests/system/test_threads.py tests/contact/test_repeatability.py tests/contact/test_candidates.py
     tests/contact/test_step_bound.py tests/energies/test_damping.py"
   export OMP_TOOL_LIBRARIES="$(llvm-config-14 --libdir)/libarcher.so"
   ;;
