@@ -23,6 +23,7 @@ def main() -> None:
     solvers = options.solvers.split(",") if options.solvers else []
     runs = {"steps": options.steps or 40, "threads": options.threads, "repeats": options.repeats}
     rivals = runner.Settings(python=options.python, integrator=options.integrator, **runs)
+    of_scenes = contact.Amount(options.tets, options.steps, options.mesh, options.repeats, options.limit)
     tables: dict[str, Callable[[], str]] = {
         "kernels": lambda: kernels.element_table(threads),
         "factor": lambda: kernels.factor_table(threads, [step.CELLS[size] for size in sizes]),
@@ -30,15 +31,7 @@ def main() -> None:
         "ablation": lambda: step.table(sizes, step.ABLATION, variant=options.variant, **runs),
         "variations": lambda: variations.table(**runs),
         "armadillo": lambda: armadillo.table(options.mesh or ARMADILLO, solvers or step.CASES, **runs),
-        "contact": lambda: contact.table(
-            options.scenes.split(","),
-            solvers or contact.CASES,
-            tets=options.tets,
-            steps=options.steps,
-            mesh=options.mesh,
-            repeats=options.repeats,
-            limit=options.limit,
-        ),
+        "contact": lambda: contact.table(options.scenes.split(","), solvers or contact.CASES, of_scenes),
         "writing": lambda: writing.table(sizes, **runs),
         "rivals": lambda: runner.table(sizes, [name for name in options.only.split(",") if name], rivals),
     }

@@ -166,46 +166,46 @@ def run_case(simulation: Simulation, steps: int, limit: float) -> ContactMeasure
     return found
 
 
-def measure(
-    name: str,
-    cases: Sequence[str],
-    *,
-    tets: int | None = None,
-    steps: int | None = None,
-    mesh: Path | None = None,
-    repeats: int = 1,
-    limit: float = inf,
-) -> dict[str, ContactMeasurement]:
-    """The fastest of several runs of each case of a scene; `tets` and `steps` by default those of the scene."""
+@dataclass(frozen=True)
+class Amount:
+    """How much of a scene is measured, and how often."""
+
+    tets: int | None = None
+    """by default those of the scene"""
+    steps: int | None = None
+    """by default those of the scene"""
+    mesh: Path | None = None
+    """a file in place of a shape"""
+    repeats: int = 1
+    limit: float = inf
+    """CPU seconds after which a run stops"""
+
+
+def measure(name: str, cases: Sequence[str], amount: Amount) -> dict[str, ContactMeasurement]:
+    """The fastest of several runs of each case of a scene."""
     if name not in SCENES:
         raise InputError(f"scene {name!r} is not known: must be one of {', '.join(SCENES)}")
     scene = SCENES[name]
     best: dict[str, ContactMeasurement] = {}
-    for _ in range(repeats):
+    for _ in range(amount.repeats):
         for case in [SolverCase.parse(case) for case in cases]:
-            found = run_case(scene.build(tets or scene.tets, case, mesh), steps or scene.steps, limit)
+            simulation = scene.build(amount.tets or scene.tets, case, amount.mesh)
+            found = run_case(simulation, amount.steps or scene.steps, amount.limit)
             if case.label not in best or found.ratio(best[case.label]) < 1:
                 best[case.label] = found
     return best
 
 
-def table(
-    scenes: Sequence[str],
-    cases: Sequence[str],
-    *,
-    tets: int | None = None,
-    steps: int | None = None,
-    mesh: Path | None = None,
-    repeats: int = 1,
-    limit: float = inf,
-) -> str:
+def table(scenes: Sequence[str], cases: Sequence[str], amount: Amount) -> str:
     """A row for each case of each scene, as Markdown."""
     rows: list[list[str]] = []
     for name in scenes:
-        found = measure(name, cases, tets=tets, steps=steps, mesh=mesh, repeats=repeats, limit=limit)
-        rows += contact_rows(name, found, steps or SCENES[name].steps)
-    lines = "; ".join(f"{name}: {SCENES[name].what}, {steps or SCENES[name].steps} steps" for name in scenes)
-    title = f"{lines}. h = 10 ms, E = 2e4 Pa, nu = 0.45, |p|_inf <= 1e-2 dhat or 1e-6 |g(x_k)|, best of {repeats}."
+        found = measure(name, cases, amount)
+        rows += contact_rows(name, found, amount.steps or SCENES[name].steps)
+    lines = "; ".join(f"{name}: {SCENES[name].what}, {amount.steps or SCENES[name].steps} steps" for name in scenes)
+    title = (
+        f"{lines}. h = 10 ms, E = 2e4 Pa, nu = 0.45, |p|_inf <= 1e-2 dhat or 1e-6 |g(x_k)|, best of {amount.repeats}."
+    )
     return f"### Solvers in contact\n\n{title} {machine_line(1)}.\n\n{markdown(header(cases), rows)}"
 
 

@@ -1,12 +1,11 @@
 #!/bin/sh
 # An editable installation of its own, build/NAME/venv, whose native module is built with flags of a sanitizer or of gcov:
-#   scripts/instrumented_build.sh NAME "FLAGS" [-Dcmake_option=value ...]
+#   scripts/instrumented_build.sh NAME "FLAGS"
 # Everything else is what .venv holds, and stays as it is. One SIMD level, little optimisation, the checks of the
-# standard library, and no CHOLMOD, which no instrument sees into.
+# standard library.
 set -eu
 cd "$(dirname "$0")/.."
 name=$1 flags=$2
-shift 2
 work=$PWD/build/$name
 mkdir -p "$work"
 
@@ -15,9 +14,7 @@ site=$("$work/venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("p
 .venv/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
   >"$site/packages_of_the_other.pth"
 
-options="-DQLB_ONE_SIMD_LEVEL=ON -DNPM=OFF"
-for option in "$@"; do options="$options $option"; done
-CMAKE_ARGS="$options" CXXFLAGS="$flags -D_GLIBCXX_ASSERTIONS" CFLAGS="$flags" \
+CMAKE_ARGS="-DQLB_ONE_SIMD_LEVEL=ON -DQLB_CHOLMOD=ON -DNPM=OFF" CXXFLAGS="$flags -D_GLIBCXX_ASSERTIONS" CFLAGS="$flags" \
   "$work/venv/bin/python" -m pip install --quiet --ignore-installed --no-deps --no-build-isolation --editable . \
   --config-settings=install.strip=false --config-settings=cmake.build-type=Debug \
   --config-settings=build-dir="$work/native"

@@ -89,26 +89,36 @@ int factor(T* panel, std::int64_t ld, std::int64_t front, std::int64_t columns) 
   return -1;
 }
 
+// last: the rows of the last block of columns, kBlock apart.
 template <class V, class T>
-inline void solve_strip(const T* triangle, std::int64_t ldt, std::int64_t columns, T* rows, std::int64_t ld,
-                        std::int64_t count) {
+inline void solve_strip(const T* triangle, std::int64_t ldt, const T* last, std::int64_t columns, T* rows,
+                        std::int64_t ld, std::int64_t count) {
   for (std::int64_t j = 0; j < columns; j += kBlock) {
-    const int n = static_cast<int>(columns - j < kBlock ? columns - j : kBlock);
-    if (j > 0) product<V, Store::subtract>(rows + j * ld, ld, rows, ld, triangle + j, ldt, count, n, j, false);
-    times_transpose<V>(triangle + j + j * ldt, ldt, n, rows + j * ld, ld, count);
+    const bool at_end = columns - j <= kBlock;
+    const int n = static_cast<int>(at_end ? columns - j : kBlock);
+    const T* block = at_end ? last : triangle + j;
+    const std::int64_t ldb = at_end ? kBlock : ldt;
+    if (j > 0) product<V, Store::subtract>(rows + j * ld, ld, rows, ld, block, ldb, count, n, j, false);
+    times_transpose<V>(block + j * ldb, ldb, n, rows + j * ld, ld, count);
   }
 }
 
-// A strip of rows at a time, copied to where its columns lie close together.
+// A strip of rows at a time, copied to where its columns lie close together. The last rows of the triangle are copied
+// too: a tile reads past them, and there other threads may be at work.
 template <class V, class T>
 void solve_rows(const T* triangle, std::int64_t ldt, std::int64_t columns, T* rows, std::int64_t ld, std::int64_t count,
                 T* work) {
   constexpr std::int64_t strip = kTileRows<V>;
+  T* last = work + strip * columns;
+  const std::int64_t first = (columns - 1) / kBlock * kBlock;
+  for (std::int64_t j = 0; j < columns; ++j)
+    for (std::int64_t k = 0; k < kBlock; ++k)
+      last[k + j * kBlock] = first + k < columns ? triangle[first + k + j * ldt] : T(0);
   for (std::int64_t i = 0; i < count; i += strip) {
     const std::int64_t height = count - i < strip ? count - i : strip;
     for (std::int64_t j = 0; j < columns; ++j)
       for (std::int64_t k = 0; k < height; ++k) work[k + j * strip] = rows[i + k + j * ld];
-    solve_strip<V>(triangle, ldt, columns, work, strip, height);
+    solve_strip<V>(triangle, ldt, last, columns, work, strip, height);
     for (std::int64_t j = 0; j < columns; ++j)
       for (std::int64_t k = 0; k < height; ++k) rows[i + k + j * ld] = work[k + j * strip];
   }

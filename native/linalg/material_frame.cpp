@@ -4,6 +4,17 @@
 #include <stdexcept>
 
 namespace qlb {
+namespace {
+
+void times(const double* T, const double* v, double* out) {
+  for (int k = 0; k < 3; ++k) out[k] = T[3 * k] * v[0] + T[3 * k + 1] * v[1] + T[3 * k + 2] * v[2];
+}
+
+void times_transpose(const double* T, const double* v, double* out) {
+  for (int k = 0; k < 3; ++k) out[k] = T[k] * v[0] + T[3 + k] * v[1] + T[6 + k] * v[2];
+}
+
+}  // namespace
 
 MaterialFrame::MaterialFrame(std::shared_ptr<const TetBlocks> blocks, std::span<const std::uint8_t> fixed, int threads)
     : geometry_(std::move(blocks), threads), threads_(threads) {
@@ -23,34 +34,27 @@ void MaterialFrame::carry(const double* x, const double* reference, double weigh
 
 std::array<double, 3> MaterialFrame::pull_back_at(std::int64_t node, const std::array<double, 3>& v) const {
   if (!carried_) return v;
-  const double* T = &maps_[9 * node];
   std::array<double, 3> out;
-  for (int k = 0; k < 3; ++k) out[k] = T[k] * v[0] + T[3 + k] * v[1] + T[6 + k] * v[2];
+  times_transpose(&maps_[9 * node], v.data(), out.data());
   return out;
 }
 
-void MaterialFrame::pull_back(const double* b, double* out) const {
+template <auto product>
+void MaterialFrame::at_each_node(const double* v, double* out) const {
   if (!carried_) {
-    std::copy_n(b, 3 * nodes(), out);
+    std::copy_n(v, 3 * nodes(), out);
     return;
   }
 #pragma omp parallel for schedule(static) num_threads(threads_) if (nodes() > 16384)
-  for (std::int64_t i = 0; i < nodes(); ++i) {
-    const double *T = &maps_[9 * i], *v = b + 3 * i;
-    for (int k = 0; k < 3; ++k) out[3 * i + k] = T[k] * v[0] + T[3 + k] * v[1] + T[6 + k] * v[2];
-  }
+  for (std::int64_t i = 0; i < nodes(); ++i) product(&maps_[9 * i], v + 3 * i, out + 3 * i);
 }
 
-void MaterialFrame::push_forward(const double* b, double* out) const {
-  if (!carried_) {
-    std::copy_n(b, 3 * nodes(), out);
-    return;
-  }
-#pragma omp parallel for schedule(static) num_threads(threads_) if (nodes() > 16384)
-  for (std::int64_t i = 0; i < nodes(); ++i) {
-    const double *T = &maps_[9 * i], *v = b + 3 * i;
-    for (int k = 0; k < 3; ++k) out[3 * i + k] = T[3 * k] * v[0] + T[3 * k + 1] * v[1] + T[3 * k + 2] * v[2];
-  }
+void MaterialFrame::pull_back(const double* v, double* out) const {
+  at_each_node<times_transpose>(v, out);
+}
+
+void MaterialFrame::push_forward(const double* v, double* out) const {
+  at_each_node<times>(v, out);
 }
 
 }  // namespace qlb

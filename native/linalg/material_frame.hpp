@@ -29,6 +29,10 @@ class MaterialFrame {
   std::array<double, 3> pull_back_at(std::int64_t node, const std::array<double, 3>& v) const;
 
  private:
+  // out = product(T, v) at each node
+  template <auto product>
+  void at_each_node(const double* v, double* out) const;
+
   TetGeometry geometry_;
   std::vector<std::int64_t> held_nodes_;
   int threads_;

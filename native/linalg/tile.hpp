@@ -3,7 +3,8 @@
 // Templates over the vector type V, as in simd/arch.hpp. The product of each entry is summed over the depth in order,
 // by fused multiply-adds, whatever tile holds the entry: so the bits do not depend on how a matrix is cut into tiles.
 //
-// A and B are read in whole vectors and tiles: up to a vector of rows, or a tile of columns, past their ends.
+// A and B are read in whole vectors and tiles: up to a vector of rows, or a tile of columns, past their ends. No other
+// thread may write there.
 #pragma once
 
 #include <cstdint>

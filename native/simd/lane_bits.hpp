@@ -7,41 +7,27 @@ namespace qlb {
 
 template <class T>
 unsigned lane_bits(const xsimd::batch_bool<T, Arch>& lanes) {
-  if constexpr (requires { lanes.mask(); }) {
-    return static_cast<unsigned>(lanes.mask());
-  } else {
+  if constexpr (requires { lanes.mask(); }) return static_cast<unsigned>(lanes.mask());
 #if defined(QLB_SIMD_AVX512)
+  else
     return static_cast<unsigned>(lanes.data);
-#else
-    alignas(64) bool truth[xsimd::batch_bool<T, Arch>::size];
-    lanes.store_aligned(truth);
-    unsigned bits = 0;
-    for (unsigned k = 0; k < xsimd::batch_bool<T, Arch>::size; ++k) bits |= static_cast<unsigned>(truth[k]) << k;
-    return bits;
-#endif
-  }
-}
-
-#if defined(QLB_SIMD_AVX2)
-inline unsigned lane_bits(const xsimd::batch_bool<double, Arch>& lanes) {
-  return static_cast<unsigned>(_mm256_movemask_pd(lanes.data));
-}
-inline unsigned lane_bits(const xsimd::batch_bool<float, Arch>& lanes) {
-  return static_cast<unsigned>(_mm256_movemask_ps(lanes.data));
-}
-inline unsigned lane_bits(const xsimd::batch_bool<std::int32_t, Arch>& lanes) {
-  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(lanes.data)));
-}
+#elif defined(QLB_SIMD_AVX2)
+  else if constexpr (sizeof(T) == 8)
+    return static_cast<unsigned>(_mm256_movemask_pd((__m256d)lanes.data));
+  else
+    return static_cast<unsigned>(_mm256_movemask_ps((__m256)lanes.data));
 #elif defined(QLB_SIMD_SSE2)
-inline unsigned lane_bits(const xsimd::batch_bool<double, Arch>& lanes) {
-  return static_cast<unsigned>(_mm_movemask_pd(lanes.data));
-}
-inline unsigned lane_bits(const xsimd::batch_bool<float, Arch>& lanes) {
-  return static_cast<unsigned>(_mm_movemask_ps(lanes.data));
-}
-inline unsigned lane_bits(const xsimd::batch_bool<std::int32_t, Arch>& lanes) {
-  return static_cast<unsigned>(_mm_movemask_ps(_mm_castsi128_ps(lanes.data)));
-}
+  else if constexpr (sizeof(T) == 8)
+    return static_cast<unsigned>(_mm_movemask_pd((__m128d)lanes.data));
+  else
+    return static_cast<unsigned>(_mm_movemask_ps((__m128)lanes.data));
+#else
+  alignas(64) bool truth[xsimd::batch_bool<T, Arch>::size];
+  lanes.store_aligned(truth);
+  unsigned bits = 0;
+  for (unsigned k = 0; k < xsimd::batch_bool<T, Arch>::size; ++k) bits |= static_cast<unsigned>(truth[k]) << k;
+  return bits;
 #endif
+}
 
 }  // namespace qlb

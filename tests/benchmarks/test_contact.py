@@ -80,7 +80,7 @@ def test_a_run_stops_after_the_step_that_exceeds_its_limit(limit: float, steps: 
 
 
 def test_measures_what_a_run_by_hand_gives() -> None:
-    found = contact.measure("squeeze", ["QLA"], tets=384, steps=6)["QLA"]
+    found = contact.measure("squeeze", ["QLA"], contact.Amount(tets=384, steps=6))["QLA"]
     block = qlb.Body(qlb.TetMesh.box((0.2,) * 3, cells=(4,) * 3), qlb.StableNeoHookean(young=2e4, poisson=0.45))
     down = np.array([0, -0.05, 0])  # [m/s]
     planes = [
@@ -130,4 +130,4 @@ def test_prints_a_row_for_each_scene_and_solver(
 
 def test_names_a_scene_that_does_not_exist() -> None:
     with pytest.raises(qlb.InputError, match="'rabbit' is not known: must be one of bunny, ducks, squeeze"):
-        contact.measure("rabbit", ["QLA"])
+        contact.measure("rabbit", ["QLA"], contact.Amount())

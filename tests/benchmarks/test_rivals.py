@@ -61,6 +61,7 @@ def test_newton_around_an_energy_agrees_with_qlb(log: bool, integrator: str) -> 
     assert [a for a, _ in iterations] == [b for _, b in iterations]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", [True, False])
 def test_every_installed_package_gives_the_same_answer(log: bool) -> None:
     settings = runner.Settings(steps=STEPS, repeats=1)
@@ -73,6 +74,7 @@ def test_every_installed_package_gives_the_same_answer(log: bool) -> None:
     assert all(o.cpu > 0 and o.iterations > 0 for o in outcomes)
 
 
+@pytest.mark.slow
 def test_what_fails_is_reported() -> None:
     broken = Rival("broken", "qlb_itself", True, options={"solver": "no such solver"})
     settings = runner.Settings(steps=1, repeats=1)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from tests.mesh.surfaces import ball, cube
 
 from qlb.cli.main import main
 from qlb.mesh import TetMesh
 from qlb.results import Run
+from tests.mesh.surfaces import ball, cube
 
 
 @pytest.fixture

@@ -1,3 +1,5 @@
+"""The barrier's values are those of IPC Toolkit, its derivatives those of finite differences."""
+
 from __future__ import annotations
 
 import ipctk

@@ -52,6 +52,7 @@ def test_few_pairs_are_listed_in_vain(rng: np.random.Generator) -> None:
     assert [len(p) for p in listed(candidates)] == [len(p) for p in soup.within(soup.x, 0.1)]  # nothing moves: exact
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("allowed", FILTERS.values(), ids=FILTERS.keys())
 def test_lists_stay_complete_along_the_path(rng: np.random.Generator, scale: float, allowed: object) -> None:

@@ -1,3 +1,5 @@
+"""Distances and closest points are those of IPC Toolkit, for each kind of pair and in degenerate positions."""
+
 from __future__ import annotations
 
 import ipctk

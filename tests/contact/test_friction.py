@@ -1,3 +1,5 @@
+"""Friction's energy, force and stiffness are those of IPC Toolkit, its derivatives those of finite differences."""
+
 from __future__ import annotations
 
 import ipctk

@@ -1,3 +1,5 @@
+"""The penalty takes signed distances: what has gone through is pushed back, by closed forms of flat pairs."""
+
 from __future__ import annotations
 
 import numpy as np

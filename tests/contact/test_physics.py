@@ -46,8 +46,11 @@ def speed_along(simulation, way: Array) -> float:
     return float((mass * simulation.state.velocities).sum(axis=0) @ way / mass.sum())
 
 
+INCLINES = ["gravity", pytest.param("plane", marks=pytest.mark.slow), pytest.param("plate", marks=pytest.mark.slow)]
+
+
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("kind", ["gravity", "plane", "plate"])
+@pytest.mark.parametrize("kind", INCLINES)
 def test_a_block_slides_down_an_incline_with_coulombs_acceleration(kind, solver):
     angle, mu = 0.5, 0.3
     simulation, way = on_incline(kind, angle, mu, solver, tolerance=BY_GRADIENT)
@@ -57,7 +60,7 @@ def test_a_block_slides_down_an_incline_with_coulombs_acceleration(kind, solver)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("kind", ["gravity", "plane", "plate"])
+@pytest.mark.parametrize("kind", INCLINES)
 def test_a_block_stays_on_an_incline(kind, solver):
     angle = 0.4
     simulation, way = on_incline(kind, angle, 1.1 * np.tan(angle), solver, tolerance=BY_GRADIENT)

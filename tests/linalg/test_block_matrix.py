@@ -1,3 +1,5 @@
+"""The block-sparse matrix does what the dense one does."""
+
 from __future__ import annotations
 
 import numpy as np

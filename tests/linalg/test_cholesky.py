@@ -1,3 +1,5 @@
+"""Every Cholesky factor solves as NumPy and SciPy do, leaves out held degrees of freedom, and names a bad pivot."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+"""Forces that are handed over apart from the gradient give the same solution."""
+
 from __future__ import annotations
 
 import numpy as np

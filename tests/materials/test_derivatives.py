@@ -1,3 +1,5 @@
+"""Stress and stiffness of each material are the derivatives of its energy density, by finite differences."""
+
 from __future__ import annotations
 
 import numpy as np

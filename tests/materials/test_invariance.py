@@ -1,3 +1,5 @@
+"""Energy, stress and stiffness turn with the frame and, without fibres, with the material."""
+
 from __future__ import annotations
 
 import numpy as np

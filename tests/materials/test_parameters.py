@@ -1,3 +1,5 @@
+"""Parameters of materials: numbers or arrays, checked against their range."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""The projected stiffness is that of NumPy's eigenvalues, clamped at zero."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Kernels of every SIMD level agree, and no lane disturbs another."""
+
 from __future__ import annotations
 
 import numpy as np

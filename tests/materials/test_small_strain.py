@@ -1,3 +1,5 @@
+"""Near the rest shape each material is linear elasticity with its Young's modulus and Poisson's ratio."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Meshes of boxes: counts, volumes, faces that fit, symmetry."""
+
 from __future__ import annotations
 
 from collections import Counter

@@ -1,3 +1,5 @@
+"""Files of tets: what is written is read back, and what is damaged is refused in one line."""
+
 from __future__ import annotations
 
 import subprocess

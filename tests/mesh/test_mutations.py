@@ -130,6 +130,7 @@ def test_a_header_that_claims_a_great_many_allocates_little(tmp_path: Path, name
         assert peak < 1.5e6  # 1.5 GB
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gmsh41 text.msh", "text.vtu", "surface.obj", "binary.stl", "surface.glb"])
 def test_the_command_ends_with_status_2(tmp_path: Path, name: str) -> None:
     path = tmp_path / name

@@ -1,3 +1,5 @@
+"""A mesh is checked when it is made; its lengths, volumes and boundary are those of geometry."""
+
 from __future__ import annotations
 
 import numpy as np

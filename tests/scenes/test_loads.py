@@ -6,13 +6,13 @@ import json
 
 import numpy as np
 import pytest
-from tests.support import Array
 
 from qlb import InputError, PointForce, Pressure, Simulation, TetMesh, TimeTable, Traction
 from qlb.energies import DeadLoad
 from qlb.integrators import Stage
 from qlb.scenes import SCENES, load_scene, scene_yaml
 from qlb.scenes.loads import LoadSettings
+from tests.support import Array
 
 TEXT = """
 scene: bar

@@ -24,9 +24,9 @@ def rounded_cylinder_volume(radius: float, height: float, rounding: float) -> fl
 @pytest.mark.parametrize(
     ("solid", "volume"),
     [
-        (shapes.sphere(1.0), 4 / 3 * np.pi),
+        pytest.param(shapes.sphere(1.0), 4 / 3 * np.pi, marks=pytest.mark.slow),
         (shapes.ellipsoid((1.0, 0.7, 0.6)), 4 / 3 * np.pi * 0.42),
-        (shapes.ring(1.0, 0.4), 2 * np.pi**2 * 0.16),
+        pytest.param(shapes.ring(1.0, 0.4), 2 * np.pi**2 * 0.16, marks=pytest.mark.slow),
         (shapes.rounded_cylinder(0.6, 1.6, 0.3), rounded_cylinder_volume(0.6, 1.6, 0.3)),
         (
             shapes.round_cone((-0.5, 0, 0), (0.5, 0.3, 0), 0.4, 0.4),
@@ -55,6 +55,7 @@ def test_boundary_nodes_lie_on_the_surface():
     assert np.abs(solid(mesh.positions[boundary])).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_angles_of_any_surface_in_any_place():
     generator = np.random.default_rng(7)
     low, high = 180.0, 0.0

@@ -45,6 +45,7 @@ def test_number_of_tets(shape):
     assert len(mesh.tets) == pytest.approx(6000, rel=0.2 if name == "box" else 0.05)
 
 
+@pytest.mark.slow
 def test_same_bits_twice(shape):
     name, mesh = shape
     _character.cache_clear()
@@ -66,6 +67,7 @@ def test_characters_of_many_sizes(name, tets):
     assert mesh.edge_lengths().min() > 0.25 * mesh.edge_lengths().mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHARACTERS)
 def test_characters_stand_on_the_ground_and_are_as_tall_as_asked(name):
     mesh = shapes.SHAPES[name](tets=20_000, height=0.5)
@@ -112,6 +114,7 @@ def test_refusals(call, message):
         call()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHARACTERS)
 def test_thin_parts_have_nodes_inside(name):
     # Ears and hands are not sheets of tets with every node on the surface: some node inside is high up and far out.

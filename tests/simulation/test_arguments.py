@@ -1,3 +1,5 @@
+"""Arguments of a simulation are checked and named, and reach what they are for."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""The time loop counts steps and times, keeps its state, and asks for loads at the time of each stage."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""The line search on functions of one variable, and where rounding hides a change."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

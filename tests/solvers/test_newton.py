@@ -1,3 +1,5 @@
+"""Newton's direction, convergence and projections, and what it tries after a failure."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""When QLF and QLB factorise, which direction they take, and which pairs they keep."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Settings of the solvers are checked; their defaults are those of the paper's supplement."""
+
 from __future__ import annotations
 
 import pytest

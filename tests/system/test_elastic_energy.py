@@ -1,3 +1,5 @@
+"""Sums over a mesh are those of its elements, with their derivatives and the symmetries of mechanics."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Held nodes are exactly where they are held; wrong selections and motions are refused."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Mass matrices against closed forms; inertia's value and gradient against finite differences."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -10,6 +10,7 @@ import numpy as np
 from qlb import _native
 from qlb.arrays import FloatArray
 from qlb.contact.stage import ContactPoint
+from qlb.errors import InputError
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.contact_base import SMALL, ContactBase
 from qlb.solvers.line_search import Point
@@ -77,6 +78,8 @@ class QLA(FactoredLbfgs):
         kept = (cholesky, system.blocks, system.held.fixed, system.threads)
         if system.contact is None:
             self._carried: _native.CarriedInverse | _native.WoodburyInverse = _native.CarriedInverse(*kept)
+        elif not isinstance(cholesky, _native.SupernodalCholesky):
+            raise InputError("cholesky = 'cholmod': must be 'supernodal' for QLA in contact, which needs half-solves")
         else:
             self._carried = self._low_rank = _native.WoodburyInverse(*kept)
         self._measures = (cholesky, self.settings.precision, len(system.mesh.tets))

@@ -55,7 +55,9 @@ class SolverSettings(Settings):
         " float32; auto (default of QLA): float32, until a matrix is too ill-conditioned for that",
     )
     cholesky: CholeskyKind = Field(
-        "supernodal", description="Which Cholesky: our own supernodal one, or CHOLMOD (float64 only), the reference"
+        "supernodal",
+        description="Which Cholesky: our own supernodal one, or CHOLMOD, the reference (float64 only; not for QLA in"
+        " contact)",
     )
     keep_factor: bool = Field(True, description="Keep the factor over steps while that pays (QLA)")
     carry_factor: bool = Field(True, description="Carry the factor along with the motion of the material (QLA)")

@@ -146,10 +146,9 @@ class StageProblem:
         """E without contact and its gradient at positions `x` [m].
 
         In kg m^2 and kg m (J and N in quasistatics); the gradient has shape (n, 3), zero at held degrees of freedom.
-        What was found last is not worked out again for the same array, which nobody changes: where a solve ends the
-        next pass begins.
+        What was found last is not worked out again: where a solve ends the next pass begins.
         """
-        if self._last is not None and self._last[0] is x:
+        if self._last is not None and np.array_equal(self._last[0], x):
             return self._last[1:]
         system, gradient, energy = self.system, np.zeros(x.shape), 0.0
         with self.timer.section("gradient"):
@@ -157,7 +156,7 @@ class StageProblem:
                 energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
-        self._last = x, energy, system.clear_held(gradient)
+        self._last = x.copy(), energy, system.clear_held(gradient)
         return self._last[1:]
 
     def hessian(
