@@ -131,7 +131,6 @@ def dense_newton(stage_name: tuple[str, int], energy: Energy) -> Array:
             return x
         values, vectors = np.linalg.eigh(H[np.ix_(free, free)])
         step = vectors @ ((vectors.T @ g[free]) / np.maximum(np.abs(values), 1e-3 * values.max()))
-        x = x.copy()  # a problem keeps what it found for an array
         x.reshape(-1)[free] -= min(1.0, 0.05 / np.abs(step).max()) * step
         if np.abs(step).max() < 1e-14:
             return x
