@@ -35,8 +35,8 @@ class ContactBase:
     @staticmethod
     def of(contact: ContactPoint, held: BoolArray) -> ContactBase:
         """Those of the terms at a point that are `held` (t,)."""
-        all = contact.terms()
-        terms = _native.RankOneTerms(all.nodes, all.vectors, np.where(held, all.stiffness, 0.0))
+        found = contact.terms()
+        terms = _native.RankOneTerms(found.nodes, found.vectors, np.where(held, found.stiffness, 0.0))
         return ContactBase(contact.contacts.key.copy(), contact.sliding_keys.copy(), terms)
 
     @property
