@@ -51,8 +51,7 @@ void bind_contact(nb::module_& m) {
       nb::arg("motion"), nb::arg("share"), ReleaseGil(),
       "The largest part of a step p (n, 3) [m] from x, at most 1, that takes no more than `share` of any gap between "
       "vertices (v) and planes, normals (q, 3), offsets (q), that hold them out (near (v, q)) and whose offsets grow "
-      "by "
-      "motion (q) [m] at the same time; and the node and the plane that bound it, -1 where none does.");
+      "by motion (q) [m] at the same time; and the node and the plane that bound it, -1 where none does.");
 }
 
 }  // namespace qlb

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qlb import _native
+from qlb import Contact, _native
+from qlb.contact.stage import StageContact
+from qlb.integrators.integrator import Origin, Stage
+from qlb.timing import Timer
 from tests.contact.pairs import (
     EDGE_EDGE,
     NO_PAIRS,
@@ -17,6 +20,7 @@ from tests.contact.pairs import (
     draw,
     six_nodes,
 )
+from tests.contact.scenes import block, simulate
 from tests.support import difference
 
 DHAT, STIFFNESS, SCALE = 0.8, 3e4, 0.37
@@ -139,3 +143,19 @@ def test_edge_signs_must_be_one_per_pair() -> None:
         scene.evaluate(make_barrier(scene), np.zeros((6, 3)), 1.0, np.ones(2, dtype=np.int8))
     with pytest.raises(ValueError, match="edge_sign holds 0, must be 1 or -1"):
         scene.evaluate(make_barrier(scene), np.zeros((6, 3)), 1.0, sign_of(0))
+
+
+@pytest.mark.parametrize(("depth", "acts"), [(0.5, True), (1.5, True), (2.5, False)])
+def test_candidates_reach_as_deep_as_the_penalty(depth: float, acts: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A block whose one face is `depth` dhat within a larger one."""
+    monkeypatch.setattr("qlb.contact.stage.MARGIN", 0.0)
+    dhat = 4e-3
+    bodies = [block(name="a"), block((0.1, 0.04, 0.08), (0.3, 0.011, 0.007), name="b")]
+    simulation = simulate(bodies, contact=Contact(mode="penalty", dhat=dhat))
+    x, model = simulation.state.positions.copy(), simulation.system.contact
+    assert model is not None
+    first, second = simulation.nodes_of(0), simulation.nodes_of(1)
+    x[second, 0] += x[first, 0].max() - x[second, 0].min() - depth * dhat
+    stage = Stage(1e-2, 1e-2, ((1.0, x),), np.zeros_like(x))
+    deepest = StageContact(model, stage, 1.0, Origin(x, 0.0), Timer()).at(x).contacts.distance.min(initial=dhat)
+    assert (deepest == pytest.approx(-depth * dhat, rel=1e-9)) == acts
