@@ -101,14 +101,14 @@ def rivals(mesh: TetMesh, workers: int) -> list[Rival]:
     held = (mesh.positions[:, :1] < 1e-9).repeat(3, axis=1).astype(np.uint8)
     b, x = np.ones_like(mesh.positions), np.empty_like(mesh.positions)
 
-    def rival(name: str, factor: _native.Cholesky, entry: int) -> Rival:
-        read = 2.0 * entry * factor.factor_nonzeros
+    def rival(name: str, factor: _native.Cholesky, read: float) -> Rival:
         return Rival(name, lambda: factor.factorise(matrix), lambda: factor.apply(b, x), factor.factor_flops, read)
 
-    found = [rival("CHOLMOD float64", _native.CholmodCholesky(system.pattern, held, workers), 8)]
-    for precision, entry in (("float64", 8), ("float32", 4)):
+    cholmod = _native.CholmodCholesky(system.pattern, held, workers)
+    found = [rival("CHOLMOD float64", cholmod, 16.0 * cholmod.factor_nonzeros)]
+    for precision in ("float64", "float32", "compact"):
         ours = _native.SupernodalCholesky(system.pattern, held, workers, precision)
-        found.append(rival(f"ours {precision}", ours, entry))
+        found.append(rival(f"ours {precision}", ours, ours.solve_bytes))
     if workers == 1 and (mkl := find_mkl()):
         pardiso = Pardiso(mkl, upper_triangle(matrix, system.pattern, held.ravel() == 0))
         found.append(Rival("PARDISO float64", pardiso.factorise, pardiso.solve))

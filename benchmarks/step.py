@@ -25,6 +25,7 @@ BEST_ND = "ND:projection=on-demand:initial_guess=predictor"
 CASES = ("ND:cholesky=cholmod", "ND", BEST_ND, "QLB:cholesky=cholmod", "QLB", "QLA")
 ABLATION = (
     "QLA",
+    "QLA:precision=float32",
     "QLA:precision=float64",
     "QLA:cholesky=cholmod",
     "QLA:keep_factor=false",

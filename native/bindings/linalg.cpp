@@ -12,10 +12,13 @@
 namespace qlb {
 namespace {
 
+constexpr std::array<std::pair<const char*, Precision>, 3> kPrecisions{
+    {{"compact", Precision::compact}, {"float32", Precision::float32}, {"float64", Precision::float64}}};
+
 Precision precision_named(const std::string& name) {
-  if (name == "float32") return Precision::float32;
-  if (name == "float64") return Precision::float64;
-  throw std::invalid_argument("precision is 'float32' or 'float64', not '" + name + "'");
+  for (const auto& [known, precision] : kPrecisions)
+    if (name == known) return precision;
+  throw std::invalid_argument("precision is 'compact', 'float32' or 'float64', not '" + name + "'");
 }
 
 void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
@@ -35,9 +38,8 @@ void bind_half_solves(nb::class_<SupernodalCholesky, Cholesky>& type) {
           "set_precision",
           [](SupernodalCholesky& f, const std::string& precision) { f.set_precision(precision_named(precision)); },
           nb::arg("precision"), "Go on in another precision; the factor in place is lost.")
-      .def_prop_ro(
-          "precision",
-          [](const SupernodalCholesky& f) { return f.precision() == Precision::float32 ? "float32" : "float64"; })
+      .def_prop_ro("precision",
+                   [](const SupernodalCholesky& f) { return kPrecisions[static_cast<int>(f.precision())].first; })
       .def(
           "forward_sparse",
           [](SupernodalCholesky& f, const Array<const std::int64_t>& dofs, const Array<const double>& values) {

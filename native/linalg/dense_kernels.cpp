@@ -3,6 +3,7 @@
 #include "linalg/dense_kernels.hpp"
 
 #include "linalg/dense_columns.hpp"
+#include "linalg/dense_compact.hpp"
 #include "linalg/dense_front.hpp"
 #include "linalg/dense_solve.hpp"
 #include "linalg/dense_vectors.hpp"
@@ -10,6 +11,19 @@
 
 namespace qlb {
 namespace {
+
+template <class T>
+const CompactKernels* make_compact_kernels() {
+  if constexpr (std::is_same_v<T, float>) {
+    using V = xsimd::batch<float, Arch>;
+    static const CompactKernels kernels = {dense::compact_pack<V>, dense::compact_forward_own<V>,
+                                           dense::compact_forward_below<V>, dense::compact_backward_above<V>,
+                                           dense::compact_backward_own<V>};
+    return &kernels;
+  } else {
+    return nullptr;
+  }
+}
 
 template <class T>
 const DenseKernels<T>* make_dense_kernels(const char* level) {
@@ -28,7 +42,8 @@ const DenseKernels<T>* make_dense_kernels(const char* level) {
                                           dense::subtract3<V, T>,
                                           dense::combine3<V>,
                                           dense::dot<V, T>,
-                                          dense::add_scaled<V, T>};
+                                          dense::add_scaled<V, T>,
+                                          make_compact_kernels<T>()};
   return &kernels;
 }
 

@@ -4,6 +4,7 @@
 // L, the block's inverse, with zeros above its diagonal: substitution then is nothing but products.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,6 +20,20 @@ constexpr int kRightSides = 8;  // right-hand sides solved together
 
 // Entries of the work space that `subtract` and `solve_rows` need.
 constexpr std::int64_t kWorkEntries = 2 * (kTask + 48) * kDepth + 64 * kWide;
+
+struct CompactLayout;
+
+// Substitution in the compact copy of a panel, one right-hand side: as `forward_own` and the like below, for the wide
+// block that `layout` describes, rows [first, last), or the block of columns that starts at j. kPadding entries past
+// the front of x are read, and must be finite.
+struct CompactKernels {
+  void (*pack)(const CompactLayout& layout, const float* panel, std::byte* block);
+  void (*forward_own)(const CompactLayout& layout, const std::byte* block, float* x);
+  void (*forward_below)(const CompactLayout& layout, const std::byte* block, std::int64_t first, std::int64_t last,
+                        float* x);
+  void (*backward_above)(const CompactLayout& layout, const std::byte* block, std::int64_t j, float* x);
+  void (*backward_own)(const CompactLayout& layout, const std::byte* block, float* x);
+};
 
 template <class T>
 struct DenseKernels {
@@ -62,6 +77,8 @@ struct DenseKernels {
 
   T (*dot)(const T* a, const T* b, std::int64_t n);
   void (*add_scaled)(T scale, const T* a, T* b, std::int64_t n);  // b += scale a
+
+  const CompactKernels* compact;  // of float; else null
 };
 
 // The best level that runs here, or the one named. Throws std::invalid_argument.

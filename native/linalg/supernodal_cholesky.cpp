@@ -61,18 +61,30 @@ SupernodalCholesky::SupernodalCholesky(std::shared_ptr<const BlockPattern> patte
 void SupernodalCholesky::set_precision(Precision precision) {
   ready_ = false;
   ++version_;
+  precision_ = precision;
+  const bool compact = precision == Precision::compact;
   const auto make = [&]<class T>(T) {
-    numeric_ = std::unique_ptr<Numeric<T>>(new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd_),
-                                                          HugeBuffer<T>(kRightSides * rows()), std::vector<T>(rows())});
+    numeric_ = std::unique_ptr<Numeric<T>>(
+        new Numeric<T>{SupernodalFactor<T>(supernodes_, *pattern_, threads_, simd_, compact),
+                       HugeBuffer<T>(kRightSides * rows()), std::vector<T>(rows())});
   };
-  if (precision == Precision::float32)
-    make(float{});
-  else
+  if (precision == Precision::float64)
     make(double{});
+  else
+    make(float{});
 }
 
 std::int64_t SupernodalCholesky::bytes() const {
   return std::visit([](const auto& numeric) { return numeric->factor.bytes(); }, numeric_);
+}
+
+std::int64_t SupernodalCholesky::solve_bytes() const {
+  return std::visit(
+      [&]<class N>(const std::unique_ptr<N>& numeric) -> std::int64_t {
+        const std::int64_t compact = numeric->factor.compact_bytes();
+        return 2 * (compact > 0 ? compact : nonzeros_ * static_cast<std::int64_t>(sizeof(*numeric->y.data())));
+      },
+      numeric_);
 }
 
 std::int64_t SupernodalCholesky::factorise(const BlockMatrix& matrix) {

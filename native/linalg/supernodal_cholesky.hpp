@@ -14,7 +14,8 @@
 
 namespace qlb {
 
-enum class Precision { float32, float64 };
+// compact: in float, and solves for one vector read a copy of L in 16 bits.
+enum class Precision { compact, float32, float64 };
 
 // With P the permutation to elimination order, restricted to the free degrees of freedom: P A P^T = L L^T. Vectors
 // outside are double, whatever the precision of L and of the substitutions.
@@ -27,7 +28,7 @@ class SupernodalCholesky : public Cholesky {
 
   // Goes on in another precision; the factor in place is lost.
   void set_precision(Precision precision);
-  Precision precision() const { return entry_bytes() == 4 ? Precision::float32 : Precision::float64; }
+  Precision precision() const { return precision_; }
 
   std::int64_t size() const override { return 3 * pattern_->nodes(); }
   std::int64_t rows() const { return static_cast<std::int64_t>(supernodes_.dof.size()); }
@@ -70,8 +71,8 @@ class SupernodalCholesky : public Cholesky {
   std::span<const std::int64_t> order() const { return supernodes_.dof; }   // degree of freedom of each row
   std::int64_t factor_nonzeros() const override { return nonzeros_; }
   double factor_flops() const override { return flops_; }
-  std::int64_t bytes() const;                                                 // that L takes
-  std::int64_t solve_bytes() const { return 2 * nonzeros_ * entry_bytes(); }  // of L that a solve reads
+  std::int64_t bytes() const;        // that L takes
+  std::int64_t solve_bytes() const;  // of L that a solve reads
 
  private:
   template <class T>
@@ -82,7 +83,6 @@ class SupernodalCholesky : public Cholesky {
   };
   using AnyNumeric = std::variant<std::unique_ptr<Numeric<float>>, std::unique_ptr<Numeric<double>>>;
 
-  std::int64_t entry_bytes() const { return std::holds_alternative<std::unique_ptr<Numeric<float>>>(numeric_) ? 4 : 8; }
   std::vector<std::int32_t> path_to_root(std::span<const std::int64_t> dof) const;
   // Right-hand sides to elimination order and back, divided by and times a scale; returns the scale.
   template <class T>
@@ -100,6 +100,7 @@ class SupernodalCholesky : public Cholesky {
   double flops_ = 0.0;
   int threads_;
   std::string simd_;
+  Precision precision_ = Precision::float64;
   bool ready_ = false;
   std::int64_t version_ = 0;
   AnyNumeric numeric_;

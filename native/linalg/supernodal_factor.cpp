@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "linalg/compact_layout.hpp"
 #include "linalg/teamwork.hpp"
 #include "simd/flush_subnormals.hpp"
 
@@ -25,16 +26,30 @@ std::int64_t pieces(std::int64_t n, std::int64_t size) {
   return (n + size - 1) / size;
 }
 
+// What the first columns of a panel take in the compact copy: whole wide blocks, or all columns.
+std::int64_t compact_panel_bytes(std::int64_t front, std::int64_t columns) {
+  std::int64_t sum = 0;
+  for (std::int64_t j = 0; j < columns; j += kWide)
+    sum += CompactLayout{front, j, std::min<std::int64_t>(columns, j + kWide)}.bytes();
+  return sum;
+}
+
 }  // namespace
 
 template <class T>
 SupernodalFactor<T>::SupernodalFactor(const Supernodes& supernodes, const BlockPattern& pattern, int threads,
-                                      const std::string& simd)
+                                      const std::string& simd, bool compact)
     : supernodes_(supernodes), kernels_(find_dense_kernels<T>(simd)), map_(map_assembly(supernodes, pattern)) {
   panel_begin_.push_back(0);
   for (std::int32_t s = 0; s < supernodes.count(); ++s)
     panel_begin_.push_back(panel_begin_.back() + rounded(supernodes.front(s) * supernodes.columns(s) + kPadding));
   panels_ = HugeBuffer<T>(panel_begin_.back());
+  if (compact && kernels_.compact != nullptr) {
+    compact_begin_.push_back(0);
+    for (std::int32_t s = 0; s < supernodes.count(); ++s)
+      compact_begin_.push_back(compact_begin_.back() + compact_panel_bytes(supernodes.front(s), supernodes.columns(s)));
+    compact_ = HugeBuffer<std::byte>(compact_begin_.back());
+  }
   plan(threads);
 }
 
@@ -122,8 +137,21 @@ void SupernodalFactor<T>::eliminate_front(std::int32_t s, int thread, bool share
     once(shared, [&] { report(supernodes_.first[s] + bad); });
     return;
   }
+  if (compact_.size() > 0) pack_panel(s, shared);
   make_update(s, thread, shared);
   add_children(s, thread, shared, false);
+}
+
+template <class T>
+void SupernodalFactor<T>::pack_panel(std::int32_t s, bool shared) {
+  if constexpr (std::is_same_v<T, float>) {
+    const std::int64_t front = supernodes_.front(s), columns = supernodes_.columns(s);
+    for_each(shared, pieces(columns, kWide), [&](std::int64_t k) {
+      const std::int64_t j = k * kWide;
+      kernels_.compact->pack({front, j, std::min<std::int64_t>(columns, j + kWide)}, panel(s),
+                             compact_.data() + compact_begin_[s] + compact_panel_bytes(front, j));
+    });
+  }
 }
 
 template <class T>
@@ -221,8 +249,10 @@ void SupernodalFactor<T>::make_update(std::int32_t s, int thread, bool shared) {
   });
 }
 
-template SupernodalFactor<float>::SupernodalFactor(const Supernodes&, const BlockPattern&, int, const std::string&);
-template SupernodalFactor<double>::SupernodalFactor(const Supernodes&, const BlockPattern&, int, const std::string&);
+template SupernodalFactor<float>::SupernodalFactor(const Supernodes&, const BlockPattern&, int, const std::string&,
+                                                   bool);
+template SupernodalFactor<double>::SupernodalFactor(const Supernodes&, const BlockPattern&, int, const std::string&,
+                                                    bool);
 template std::int64_t SupernodalFactor<float>::factorise(const double*);
 template std::int64_t SupernodalFactor<double>::factorise(const double*);
 

@@ -38,7 +38,9 @@ AssemblyMap map_assembly(const Supernodes& supernodes, const BlockPattern& patte
 template <class T>
 class SupernodalFactor {
  public:
-  SupernodalFactor(const Supernodes& supernodes, const BlockPattern& pattern, int threads, const std::string& simd);
+  // compact: solves for one vector read a copy of L in 16 bits (compact_layout.hpp); for T = float alone.
+  SupernodalFactor(const Supernodes& supernodes, const BlockPattern& pattern, int threads, const std::string& simd,
+                   bool compact = false);
 
   // Returns the first column, in elimination order, whose pivot is not positive or not finite, or -1.
   std::int64_t factorise(const double* values);
@@ -61,11 +63,13 @@ class SupernodalFactor {
   void forward_sides_along(std::span<const std::int32_t> path, PathWork& work) const;
 
   const DenseKernels<T>& kernels() const { return kernels_; }
-  std::int64_t bytes() const { return static_cast<std::int64_t>(panels_.bytes()); }
+  std::int64_t bytes() const { return static_cast<std::int64_t>(panels_.bytes() + compact_.bytes()); }
+  std::int64_t compact_bytes() const { return compact_.size(); }  // 0 without
 
  private:
   T* panel(std::int32_t s) { return panels_.data() + panel_begin_[s]; }
   const T* panel(std::int32_t s) const { return panels_.data() + panel_begin_[s]; }
+  bool is_compact(int sides) const { return compact_.size() > 0 && sides == 1; }
   void forward_sides_front(std::int32_t s, PathWork& work) const;
   T* update(std::int32_t s, int thread);
   T* pending(std::int32_t s, int thread);
@@ -78,6 +82,7 @@ class SupernodalFactor {
   int factor_panel(std::int32_t s, int thread, bool shared);
   int factor_wide_panel(std::int32_t s, int thread, bool shared);
   void make_update(std::int32_t s, int thread, bool shared);
+  void pack_panel(std::int32_t s, bool shared);
   void report(std::int64_t column);
 
   void gather_forward(std::int32_t s, int thread, const T* y, std::int64_t ld, int sides, T* x);
@@ -86,13 +91,18 @@ class SupernodalFactor {
   void backward_team(T* y, std::int64_t ld, int sides);
   void forward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides);
   void backward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides);
+  void forward_columns(std::int32_t s, bool shared, T* x, int sides);
+  void backward_columns(std::int32_t s, bool shared, T* x, int sides);
+  void forward_compact(std::int32_t s, bool shared, T* x);
+  void backward_compact(std::int32_t s, bool shared, T* x);
   T* side_work(int thread, bool shared) { return (shared ? shared_sides_ : side_work_[thread]).data(); }
 
   const Supernodes& supernodes_;
   const DenseKernels<T>& kernels_;
   AssemblyMap map_;
-  std::vector<std::int64_t> panel_begin_;
+  std::vector<std::int64_t> panel_begin_, compact_begin_;
   HugeBuffer<T> panels_;
+  HugeBuffer<std::byte> compact_;
   int factor_threads_, solve_threads_;  // as many as pay
 
   Schedule factor_schedule_, solve_schedule_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "linalg/compact_layout.hpp"
 #include "linalg/supernodal_factor.hpp"
 #include "linalg/teamwork.hpp"
 #include "simd/flush_subnormals.hpp"
@@ -45,12 +46,11 @@ void SupernodalFactor<T>::gather_forward(std::int32_t s, int thread, const T* y,
   }
 }
 
+// x := what the front's columns make of it.
 template <class T>
-void SupernodalFactor<T>::forward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+void SupernodalFactor<T>::forward_columns(std::int32_t s, bool shared, T* x, int sides) {
   const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
   const T* L = panel(s);
-  T* x = side_work(thread, shared);
-  once(shared, [&] { gather_forward(s, thread, y, ld, sides, x); });
   for (std::int64_t j = 0; j < columns; j += kWide) {
     const std::int64_t end = std::min<std::int64_t>(columns, j + kWide);
     const std::int64_t piece = shared ? kRowsPerTask : std::max<std::int64_t>(front - end, 1);
@@ -60,6 +60,36 @@ void SupernodalFactor<T>::forward_front(std::int32_t s, int thread, bool shared,
       kernels_.forward_below(L, front, j, end, first, std::min(front, first + piece), x, side_ld_, sides);
     });
   }
+}
+
+template <>
+void SupernodalFactor<double>::forward_compact(std::int32_t, bool, double*) {}  // there is none
+
+template <>
+void SupernodalFactor<float>::forward_compact(std::int32_t s, bool shared, float* x) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  const std::byte* block = compact_.data() + compact_begin_[s];
+  for (std::int64_t j = 0; j < columns; j += kWide) {
+    const CompactLayout layout{front, j, std::min<std::int64_t>(columns, j + kWide)};
+    const std::int64_t end = layout.end, piece = shared ? kRowsPerTask : std::max<std::int64_t>(front - end, 1);
+    once(shared, [&] { kernels_.compact->forward_own(layout, block, x); });
+    for_each(shared, pieces(front - end, piece), [&](std::int64_t k) {
+      const std::int64_t first = end + k * piece;
+      kernels_.compact->forward_below(layout, block, first, std::min(front, first + piece), x);
+    });
+    block += layout.bytes();
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::forward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  T* x = side_work(thread, shared);
+  once(shared, [&] { gather_forward(s, thread, y, ld, sides, x); });
+  if (is_compact(sides))
+    forward_compact(s, shared, x);
+  else
+    forward_columns(s, shared, x, sides);
   once(shared, [&] {
     T* up = pending(s, thread);
     for (int r = 0; r < sides; ++r) {
@@ -83,11 +113,9 @@ void SupernodalFactor<T>::gather_backward(std::int32_t s, const T* y, std::int64
 }
 
 template <class T>
-void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+void SupernodalFactor<T>::backward_columns(std::int32_t s, bool shared, T* x, int sides) {
   const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
   const T* L = panel(s);
-  T* x = side_work(thread, shared);
-  once(shared, [&] { gather_backward(s, y, ld, sides, x); });
   for (std::int64_t j = (columns - 1) / kWide * kWide; j >= 0; j -= kWide) {
     const std::int64_t end = std::min<std::int64_t>(columns, j + kWide);
     const std::int64_t piece = shared ? kColumnsPerTask : end - j;
@@ -97,8 +125,35 @@ void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared
     });
     once(shared, [&] { kernels_.backward_own(L, front, j, end, x, side_ld_, sides); });
   }
+}
+
+template <>
+void SupernodalFactor<double>::backward_compact(std::int32_t, bool, double*) {}
+
+template <>
+void SupernodalFactor<float>::backward_compact(std::int32_t s, bool shared, float* x) {
+  const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s);
+  const std::byte* block = compact_.data() + compact_begin_[s + 1];
+  for (std::int64_t j = (columns - 1) / kWide * kWide; j >= 0; j -= kWide) {
+    const CompactLayout layout{front, j, std::min<std::int64_t>(columns, j + kWide)};
+    block -= layout.bytes();
+    for_each(shared, pieces(layout.end - j, kBlock),
+             [&](std::int64_t k) { kernels_.compact->backward_above(layout, block, j + k * kBlock, x); });
+    once(shared, [&] { kernels_.compact->backward_own(layout, block, x); });
+  }
+}
+
+template <class T>
+void SupernodalFactor<T>::backward_front(std::int32_t s, int thread, bool shared, T* y, std::int64_t ld, int sides) {
+  T* x = side_work(thread, shared);
+  once(shared, [&] { gather_backward(s, y, ld, sides, x); });
+  if (is_compact(sides))
+    backward_compact(s, shared, x);
+  else
+    backward_columns(s, shared, x, sides);
   once(shared, [&] {
-    for (int r = 0; r < sides; ++r) std::copy_n(x + r * side_ld_, columns, y + supernodes_.first[s] + r * ld);
+    for (int r = 0; r < sides; ++r)
+      std::copy_n(x + r * side_ld_, supernodes_.columns(s), y + supernodes_.first[s] + r * ld);
   });
 }
 

@@ -11,8 +11,8 @@ from qlb import TetMesh, _native
 from qlb.system import System
 from tests.support import Array, dense, elastic_hessian, make_system, random_rotation
 
-PRECISIONS = ["float64", "float32"]
-TOLERANCE = {"float64": 1e-10, "float32": 1e-3}
+PRECISIONS = ["float64", "float32", "compact"]
+TOLERANCE = {"float64": 1e-10, "float32": 1e-3, "compact": 1e-2}
 
 
 @dataclass

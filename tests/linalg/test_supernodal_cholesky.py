@@ -10,7 +10,7 @@ from qlb import TetMesh, _native
 from tests.support import Array, dense, elastic_hessian, jittered, make_system
 
 Mask = NDArray[np.uint8]
-PRECISIONS = ["float64", "float32"]
+PRECISIONS = ["float64", "float32", "compact"]
 
 
 def hessian(mesh: TetMesh, mass: float = 1e4) -> tuple[_native.BlockPattern, _native.BlockMatrix]:
@@ -84,12 +84,12 @@ def test_solution_is_that_of_cholmod(mesh: TetMesh, held: object, simd: str, rng
     b = rng.normal(size=mesh.positions.shape)
     assert reference.factorise(matrix) == -1
     expected = solve(reference, b)
-    for precision, tolerance in (("float64", 1e-11), ("float32", 1e-3)):
+    for precision, tolerance in (("float64", 1e-11), ("float32", 1e-3), ("compact", 1e-2)):
         cholesky = _native.SupernodalCholesky(pattern, mask, 1, precision, simd)
         assert cholesky.factorise(matrix) == -1
         x = solve(cholesky, b)
         np.testing.assert_allclose(x, expected, rtol=0, atol=tolerance * np.abs(expected).max())
-        assert residual(matrix, mask, x, b) < {"float64": 1e-12, "float32": 1e-5}[precision]
+        assert residual(matrix, mask, x, b) < {"float64": 1e-12, "float32": 1e-5, "compact": 1e-3}[precision]
 
 
 def test_avx2_and_avx512_give_the_same_bits(block: TetMesh, rng: np.random.Generator) -> None:
@@ -183,7 +183,7 @@ def test_a_sparse_half_solve_is_the_dense_one(
         dofs = rng.integers(0, size, count)  # some held, some twice
         values = rng.normal(size=count)
         b, y = np.zeros(size), np.empty(cholesky.rows)
-        np.add.at(b, dofs, values.astype(precision))
+        np.add.at(b, dofs, values.astype("float64" if precision == "float64" else "float32"))
         cholesky.forward(b, y)
         rows, found = cholesky.forward_sparse(dofs, values)
         assert np.all(np.diff(rows) > 0)
@@ -294,7 +294,7 @@ def test_a_pattern_without_couplings(precision: str, rng: np.random.Generator) -
 def test_misuse_is_refused(mesh: TetMesh) -> None:
     pattern, matrix = hessian(mesh)
     mask = nothing_held(mesh)
-    with pytest.raises(ValueError, match="precision is 'float32' or 'float64', not 'half'"):
+    with pytest.raises(ValueError, match="precision is 'compact', 'float32' or 'float64', not 'half'"):
         _native.SupernodalCholesky(pattern, mask, 1, "half")
     with pytest.raises(ValueError, match="SIMD level 'mmx' is not available"):
         _native.SupernodalCholesky(pattern, mask, 1, "float32", "mmx")
@@ -325,6 +325,29 @@ def test_sizes_of_the_factor_add_up(mesh: TetMesh) -> None:
     assert double.bytes > 8 * double.factor_nonzeros
 
 
+def test_solves_of_a_compact_factor_read_half_of_it(block: TetMesh) -> None:
+    pattern, _ = hessian(block)
+    single, compact = (_native.SupernodalCholesky(pattern, nothing_held(block), 1, p) for p in ("float32", "compact"))
+    assert compact.precision == "compact"
+    assert compact.solve_bytes < 0.6 * single.solve_bytes
+    assert compact.bytes == single.bytes + compact.solve_bytes // 2
+
+
+@pytest.mark.parametrize("power", [-40, 40])
+def test_entries_in_16_bits_go_by_their_size_in_their_column(
+    block: TetMesh, power: int, rng: np.random.Generator
+) -> None:
+    """So the factor of 4^k A is 2^k times that of A, to the bit."""
+    pattern, matrix = hessian(block)
+    b = rng.normal(size=block.positions.shape)
+    cholesky = _native.SupernodalCholesky(pattern, some_held(block), 1, "compact")
+    cholesky.factorise(matrix)
+    x = solve(cholesky, b)
+    matrix.values[...] *= 2.0**power
+    assert cholesky.factorise(matrix) == -1
+    np.testing.assert_array_equal(solve(cholesky, b) * 2.0**power, x)
+
+
 def test_another_precision_can_be_taken_up(block: TetMesh, rng: np.random.Generator) -> None:
     pattern, matrix = hessian(block)
     mask, b = some_held(block), rng.normal(size=block.positions.shape)
@@ -344,7 +367,7 @@ def test_right_hand_sides_beyond_the_range_of_float_are_solved_as_well(
 ) -> None:
     pattern, matrix = hessian(block)
     b = rng.normal(size=block.positions.shape)
-    cholesky = _native.SupernodalCholesky(pattern, some_held(block), 1, "float32")
+    cholesky = _native.SupernodalCholesky(pattern, some_held(block), 1, "compact")
     cholesky.factorise(matrix)
     x = solve(cholesky, b)
     np.testing.assert_allclose(solve(cholesky, scale * b) / scale, x, rtol=0, atol=1e-5 * np.abs(x).max())

@@ -278,7 +278,7 @@ class QLA(FactoredLbfgs):
         The pattern is extended where those that do not are many.
         """
         self._reference = None  # until the new factor stands
-        if projection == "on-demand" and (self._indefinite or problem.system.is_inverted(point.x)):
+        if projection == "on-demand" and self._indefinite:
             projection = "always"
         contact = None
         if point.contact is not None:

@@ -52,7 +52,8 @@ class SolverSettings(Settings):
     precision: Precision | None = Field(
         None,
         description="Of the Cholesky factor and its solves, all else being float64: float64 (default of ND, QLF, QLB);"
-        " float32; auto (default of QLA): float32, until a matrix is too ill-conditioned for that",
+        " float32; compact: float32, of which solves read a copy in 16 bits; auto (default of QLA): compact, until a"
+        " matrix is too ill-conditioned for that, then float64",
     )
     cholesky: CholeskyKind = Field(
         "supernodal",

@@ -28,7 +28,7 @@ from qlb.system.held_nodes import HeldNodes
 
 MassKind = Literal["lumped", "consistent"]
 CholeskyKind = Literal["supernodal", "cholmod"]
-Precision = Literal["auto", "float32", "float64"]
+Precision = Literal["auto", "compact", "float32", "float64"]
 
 
 @dataclass(frozen=True)
@@ -202,13 +202,13 @@ class System:
 
         Args:
             kind: whose.
-            precision: of its numbers; "auto" begins with float32.
+            precision: of its numbers; "auto" begins with "compact".
             pattern: an extended one, instead of that of the system.
             order: the nodes in the order of their elimination, shape (n,); METIS finds one by default.
         """
         pattern = pattern or self.pattern
         if kind == "supernodal":
-            first = "float32" if precision == "auto" else precision
+            first = "compact" if precision == "auto" else precision
             return _native.SupernodalCholesky(pattern, self.held.fixed, self.threads, first, order=order)
         if not hasattr(_native, "CholmodCholesky"):
             raise InputError("cholesky = 'cholmod' is not in this build: see 'Reference' in docs/components.md")
