@@ -19,19 +19,38 @@ void BlockMatrix::shift_diagonal(double amount) {
   }
 }
 
+void BlockMatrix::check_stencils(std::span<const std::int32_t> nodes) const {
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    if (nodes[k] < 0 || nodes[k] >= pattern_->nodes())
+      throw std::out_of_range("stencil " + std::to_string(k / 4) + " has a node outside [0, " +
+                              std::to_string(pattern_->nodes()) + ")");
+}
+
 void BlockMatrix::add_stencils(std::span<const std::int32_t> nodes, const double* blocks) {
+  check_stencils(nodes);
   for (std::size_t first = 0; first < nodes.size(); first += 4, blocks += 144)
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
         const std::int32_t i = nodes[first + a], j = nodes[first + b];
         if (i < j) continue;  // its transpose stands for it
-        if (j < 0 || i >= pattern_->nodes())
-          throw std::out_of_range("stencil " + std::to_string(first / 4) + " has a node outside [0, " +
-                                  std::to_string(pattern_->nodes()) + ")");
         double* to = values() + 9 * pattern_->find(i, j);
         const double* from = blocks + 36 * a + 3 * b;
         for (int c = 0; c < 3; ++c)
           for (int d = 0; d < 3; ++d) to[3 * c + d] += from[12 * c + d];
+      }
+}
+
+void BlockMatrix::add_rank_one(std::span<const std::int32_t> nodes, const double* vectors, const double* stiffness,
+                               std::span<const std::uint8_t> left_out) {
+  check_stencils(nodes);
+  for (std::size_t first = 0; first < nodes.size(); first += 4, vectors += 12, ++stiffness)
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        const std::int32_t i = nodes[first + a], j = nodes[first + b];
+        if (i < j || left_out[i] || left_out[j]) continue;
+        double* to = values() + 9 * pattern_->find(i, j);
+        for (int c = 0; c < 3; ++c)
+          for (int d = 0; d < 3; ++d) to[3 * c + d] += *stiffness * vectors[3 * a + c] * vectors[3 * b + d];
       }
 }
 

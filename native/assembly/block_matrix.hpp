@@ -24,12 +24,18 @@ class BlockMatrix {
   // Adds symmetric matrices between up to four nodes: nodes (count, 4), blocks (count, 12, 12). A node that is repeated
   // takes the sum of its rows and columns. Throws std::out_of_range where the pattern lacks a pair.
   void add_stencils(std::span<const std::int32_t> nodes, const double* blocks);
+  // Adds stiffness_j a_j a_j^T, a_j with a vector for each of up to four nodes, nodes (count, 4), vectors (count, 4,
+  // 3); `left_out` (nodes of the pattern): nonzero where vectors count as zero. Throws as add_stencils.
+  void add_rank_one(std::span<const std::int32_t> nodes, const double* vectors, const double* stiffness,
+                    std::span<const std::uint8_t> left_out);
   // What `other` holds, over the inner pattern of the map, and zero elsewhere.
   void set_from(const PatternMap& map, const BlockMatrix& other);
   // out = A x, both (nodes, 3)
   void multiply(const double* x, double* out) const;
 
  private:
+  void check_stencils(std::span<const std::int32_t> nodes) const;
+
   std::shared_ptr<const BlockPattern> pattern_;
   Aligned<double> values_;
 };

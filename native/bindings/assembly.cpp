@@ -1,6 +1,7 @@
 #include "bindings/bindings.hpp"
 
 #include "assembly/block_matrix.hpp"
+#include "linalg/rank_one_terms.hpp"
 
 namespace qlb {
 
@@ -58,6 +59,16 @@ void bind_assembly(nb::module_& m) {
           nb::arg("nodes"), nb::arg("blocks"), ReleaseGil(),
           "Adds symmetric matrices, shape (k, 12, 12), between the nodes of stencils, shape (k, 4); repeated nodes add "
           "up.")
+      .def(
+          "add_rank_one",
+          [](BlockMatrix& a, const RankOneTerms& terms, const Array<const std::uint8_t>& left_out) {
+            const auto count = static_cast<std::size_t>(4 * terms.size());
+            sized(left_out, a.pattern().nodes(), "left_out");
+            a.add_rank_one({terms.all_nodes().data()->data(), count}, terms.all_vectors().data()->data(),
+                           terms.all_stiffness().data(), view(left_out));
+          },
+          nb::arg("terms"), nb::arg("left_out"), ReleaseGil(),
+          "Adds the sum of the terms; vectors at nodes that are `left_out`, shape (n,), count as zero.")
       .def("set_from", &BlockMatrix::set_from, nb::arg("map"), nb::arg("other"), ReleaseGil(),
            "Takes the values of a matrix over the inner pattern of the map; zero elsewhere.")
       .def(

@@ -32,8 +32,7 @@ Mat3<V> times_transpose(const Mat3<V>& A, const Mat3<V>& B, const V& volume) {
   return C;
 }
 
-// slot_sums (slots, 2, 3, 3), overwritten: sums of volume F(x) G^T and volume G G^T over the elements at each slot,
-// G = F(reference).
+// slot_sums (slots, 3, 3), overwritten: sums of volume F(x) F(reference)^T over the elements at each slot.
 // `scratch` holds 2 * kStride * slots doubles.
 template <class V>
 void chunk_correlations(const ChunkData& chunk, const double* x, const double* reference, double* scratch,
@@ -41,32 +40,34 @@ void chunk_correlations(const ChunkData& chunk, const double* x, const double* r
   double* reference_scratch = scratch + kStride * chunk.slots;
   load_positions(chunk, x, scratch);
   load_positions(chunk, reference, reference_scratch);
-  set_zero(slot_sums, 18 * chunk.slots);
+  set_zero(slot_sums, 9 * chunk.slots);
   for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
     for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
       const Tets<V> tets(chunk, pack, lane);
-      const Mat3<V> F = tets.deformation_gradient(scratch), G = tets.deformation_gradient(reference_scratch);
-      const Mat3<V> sums[2] = {times_transpose(F, G, tets.volume), times_transpose(G, G, tets.volume)};
-      for (int a = 0; a < 4; ++a)
-        for (int m = 0; m < 2; ++m) {
-          std::int32_t slots[V::size];
-          for (std::size_t l = 0; l < V::size; ++l)
-            slots[l] = 2 * static_cast<std::int32_t>(tets.vertex[a * kLanes + l]) + m;
-          Scatter<V>::add_matrix(sums[m], slots, slot_sums);
-        }
+      const Mat3<V> sum = times_transpose(tets.deformation_gradient(scratch),
+                                          tets.deformation_gradient(reference_scratch), tets.volume);
+      for (int a = 0; a < 4; ++a) {
+        std::int32_t slots[V::size];
+        for (std::size_t l = 0; l < V::size; ++l) slots[l] = static_cast<std::int32_t>(tets.vertex[a * kLanes + l]);
+        Scatter<V>::add_matrix(sum, slots, slot_sums);
+      }
     }
 }
 
-// T = (1 - weight) R + weight A for each pair of `sums` (count, 2, 3, 3), C and S: A = C S^-1 the affine map that takes
-// the reference to x with the least error, R the rotation nearest to C. T is written over C.
+// T = (1 - weight) R + weight A for each C of `maps` (count, 3, 3) and S of `reference` (count, 3, 3): A = C S^-1 the
+// affine map that takes the reference to x with the least error, R the rotation nearest to C. T is written over C.
 template <class V>
-void nodal_maps(double* sums, std::int64_t count, double weight) {
+void nodal_maps(double* maps, const double* reference, std::int64_t count, double weight) {
   constexpr auto kWidth = static_cast<std::int64_t>(V::size);
   alignas(64) double buffer[18][V::size];
   for (std::int64_t first = 0; first < count; first += kWidth) {
     const std::int64_t lanes = count - first < kWidth ? count - first : kWidth;
     for (std::int64_t l = 0; l < kWidth; ++l)
-      for (int k = 0; k < 18; ++k) buffer[k][l] = sums[18 * (first + (l < lanes ? l : 0)) + k];
+      for (int k = 0; k < 9; ++k) {
+        const std::int64_t from = 9 * (first + (l < lanes ? l : 0)) + k;
+        buffer[k][l] = maps[from];
+        buffer[9 + k][l] = reference[from];
+      }
     Mat3<V> C, S;
     for (int k = 0; k < 9; ++k) {
       C(k / 3, k % 3) = V::load_aligned(buffer[k]);
@@ -77,7 +78,7 @@ void nodal_maps(double* sums, std::int64_t count, double weight) {
     const Mat3<V> R = nearest_rotation(C);
     for (int k = 0; k < 9; ++k) (V(1.0 - weight) * R(k / 3, k % 3) + scale * A(k / 3, k % 3)).store_aligned(buffer[k]);
     for (std::int64_t l = 0; l < lanes; ++l)
-      for (int k = 0; k < 9; ++k) sums[18 * (first + l) + k] = buffer[k][l];
+      for (int k = 0; k < 9; ++k) maps[9 * (first + l) + k] = buffer[k][l];
   }
 }
 

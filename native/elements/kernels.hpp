@@ -43,7 +43,7 @@ struct MaterialKernels {
 struct GeometryKernels {
   double (*least_J)(const ChunkData&, const double* x, double* scratch);
   void (*correlations)(const ChunkData&, const double* x, const double* reference, double* scratch, double* slot_sums);
-  void (*nodal_maps)(double* sums, std::int64_t count, double weight);
+  void (*nodal_maps)(double* maps, const double* reference, std::int64_t count, double weight);
 };
 
 struct KernelSet {

@@ -23,24 +23,29 @@ inline D load_doubles(const float* from) {
 #endif
 }
 
-// g (3 x 3, row by row) = A^T B, A and B (rows x 3), with kPadding zeros below each column.
+// g (3 x 3, row by row) = A^T B, A and B (rows x 3), with kPadding zeros below each column. Summed in T over kPart
+// rows, then in double.
 template <class V, class T>
 void gram3(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g) {
-  using D = xsimd::batch<double, typename V::arch_type>;
-  D sum[3][3];
+  constexpr std::int64_t kPart = 16 * kLanes<V>;
+  for (int k = 0; k < 9; ++k) g[k] = 0.0;
+  for (std::int64_t first = 0; first < rows; first += kPart) {
+    const std::int64_t last = rows - first < kPart ? rows : first + kPart;
+    V sum[3][3];
 #pragma GCC unroll 9
-  for (int k = 0; k < 9; ++k) sum[k / 3][k % 3] = D(0.0);
-  for (std::int64_t i = 0; i < rows; i += kLanes<D>) {
-    const D x[3] = {load_doubles<D>(a + i), load_doubles<D>(a + i + lda), load_doubles<D>(a + i + 2 * lda)};
+    for (int k = 0; k < 9; ++k) sum[k / 3][k % 3] = V(T(0));
+    for (std::int64_t i = first; i < last; i += kLanes<V>) {
+      const V x[3] = {V::load_unaligned(a + i), V::load_unaligned(a + i + lda), V::load_unaligned(a + i + 2 * lda)};
 #pragma GCC unroll 3
-    for (int d = 0; d < 3; ++d) {
-      const D y = load_doubles<D>(b + i + d * ldb);
+      for (int d = 0; d < 3; ++d) {
+        const V y = V::load_unaligned(b + i + d * ldb);
 #pragma GCC unroll 3
-      for (int c = 0; c < 3; ++c) sum[c][d] = xsimd::fma(x[c], y, sum[c][d]);
+        for (int c = 0; c < 3; ++c) sum[c][d] = xsimd::fma(x[c], y, sum[c][d]);
+      }
     }
-  }
 #pragma GCC unroll 9
-  for (int k = 0; k < 9; ++k) g[k] = sum_of_lanes<D, double>(sum[k / 3][k % 3]);
+    for (int k = 0; k < 9; ++k) g[k] += sum_of_lanes<V, T>(sum[k / 3][k % 3]);
+  }
 }
 
 // t (3) += A^T y.

@@ -83,8 +83,7 @@ inline __m512 sums_of_lanes(const __m512 (&v)[16]) {
       return _mm512_add_ps(_mm512_shuffle_f32x4(a, b, 0x44), _mm512_shuffle_f32x4(a, b, 0xee));
     };
     const __m512 first = halves(v[q], v[q + 4]), second = halves(v[q + 8], v[q + 12]);
-    quarter[q] =
-        _mm512_add_ps(_mm512_shuffle_f32x4(first, second, 0x88), _mm512_shuffle_f32x4(first, second, 0xdd));
+    quarter[q] = _mm512_add_ps(_mm512_shuffle_f32x4(first, second, 0x88), _mm512_shuffle_f32x4(first, second, 0xdd));
   }
   const auto pairs = [](__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
@@ -135,9 +134,8 @@ inline void subtract_dots(const std::int16_t* from, std::int64_t tiles, int n, c
   if (tiles == 0) return;
   float sums[kBlock];
   for (int p = 0; p < n; p += group)
-    with_width<group>(n - p < group ? n - p : group, [&]<int width>() {
-      dot_tiles<V, width>(from + p * kTileHeight, tiles, n, y, sums + p);
-    });
+    with_width<group>(n - p < group ? n - p : group,
+                      [&]<int width>() { dot_tiles<V, width>(from + p * kTileHeight, tiles, n, y, sums + p); });
   for (int p = 0; p < n; ++p) x[p] -= scale[p] * sums[p];
 }
 
@@ -216,7 +214,8 @@ inline float largest(const float* v, std::int64_t n) {
   return all;
 }
 
-// Up to kTileHeight entries in steps of 1/steps, rounded to the nearest: the sum with 1.5 2^23 ends in them as integers.
+// Up to kTileHeight entries in steps of 1/steps, rounded to the nearest: the sum with 1.5 2^23 ends in them as
+// integers.
 template <class V>
 inline void pack_entries(const float* from, float steps, std::int16_t* to) {
   constexpr float magic = 12582912.0f;

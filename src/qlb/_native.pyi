@@ -49,6 +49,11 @@ class BlockMatrix:
         Adds symmetric matrices, shape (k, 12, 12), between the nodes of stencils, shape (k, 4); repeated nodes add up.
         """
 
+    def add_rank_one(self, terms: RankOneTerms, left_out: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu', writable=False)]) -> None:
+        """
+        Adds the sum of the terms; vectors at nodes that are `left_out`, shape (n,), count as zero.
+        """
+
     def set_from(self, map: PatternMap, other: BlockMatrix) -> None:
         """
         Takes the values of a matrix over the inner pattern of the map; zero elsewhere.

@@ -157,7 +157,7 @@ def test_a_factor_whose_pattern_is_extended_stays_in_single_precision():
     solver = resting().solver
     assert isinstance(solver, QLA)
     first = solver.factor.cholesky
-    assert extended(solver, 16) == "float32"
+    assert extended(solver, 16) == "compact"
     assert solver.factor.cholesky is not first
     assert solver.factor.raise_precision()
     assert extended(solver, 15) == "float64"

@@ -95,6 +95,24 @@ def test_stencils_add_up_like_dense_matrices(pattern: _native.BlockPattern, rng:
     np.testing.assert_allclose(dense(matrix, larger), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
+def test_rank_one_terms_add_up_like_dense_matrices(pattern: _native.BlockPattern, rng: np.random.Generator) -> None:
+    nodes = np.array([[0, 5, 2, 7], [3, 3, 1, 3], [8, 2, 0, 5]], dtype=np.int32)
+    larger = _native.BlockPattern(pattern.nodes, np.concatenate([TetMesh.box(cells=(2, 2, 1)).tets, nodes]))
+    matrix, left_out = random_matrix(larger, rng), np.zeros(pattern.nodes, dtype=np.uint8)
+    left_out[[2, 8]] = 1
+    vectors, stiffness = rng.normal(size=(3, 4, 3)), np.array([2.0, -0.5, 3.0])
+    expected = dense(matrix, larger)
+    for stencil, a, k in zip(nodes, vectors, stiffness, strict=True):
+        whole = np.zeros((pattern.nodes, 3))
+        np.add.at(whole, stencil, a)
+        whole[left_out == 1] = 0.0
+        expected += k * np.outer(whole, whole)
+    matrix.add_rank_one(_native.RankOneTerms(nodes, vectors, stiffness), left_out)
+    np.testing.assert_allclose(dense(matrix, larger), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    with pytest.raises(ValueError, match="left_out has 1 entries"):
+        matrix.add_rank_one(_native.RankOneTerms(nodes, vectors, stiffness), left_out[:1])
+
+
 def test_stencils_that_do_not_fit_are_refused() -> None:
     matrix = _native.BlockMatrix(_native.BlockPattern(4, np.array([[0, 1]], dtype=np.int32)))
     with pytest.raises(IndexError, match=r"block \(2, 0\) is not in the pattern"):

@@ -200,6 +200,19 @@ def test_residual_scale_is_a_force_of_order_one_strain(case: Case) -> None:
     assert case.problem.residual_scale == pytest.approx(expected, rel=1e-12)
 
 
+def test_a_stage_that_begins_where_another_ended_evaluates_no_element_again(case: Case) -> None:
+    system, problem = case.system, case.problem
+    energy, gradient = problem.value_gradient(case.x)
+    kept, system.potentials = system.potentials, []
+    try:
+        following = StageProblem(system, problem.stage, case.state, Timer())
+        again, same = following.value_gradient(case.x.copy())
+    finally:
+        system.potentials = kept
+    assert again == energy
+    np.testing.assert_array_equal(same, gradient)
+
+
 def test_evaluation_leaves_the_positions_alone(case: Case) -> None:
     before = case.x.copy()
     case.problem.value_gradient(case.x)

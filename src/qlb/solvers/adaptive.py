@@ -168,12 +168,13 @@ class QLA(FactoredLbfgs):
         assert self._base is not None
         terms, framed = self._base.difference(contact, given, self._low_rank, problem.node_stiffness)
         beside = np.flatnonzero(terms.stiffness)
-        nodes = terms.nodes[beside]
-        fresh = np.unique(nodes[~self._has_column[nodes]])
-        new = COLUMN * len(fresh)
+        fresh = np.zeros(self.system.nodes, dtype=bool)
+        fresh[terms.nodes[beside]] = True
+        fresh &= ~self._has_column
+        new = COLUMN * np.count_nonzero(fresh)
         if len(beside) > CROWD or new > most:
             return terms, False
-        self._has_column[fresh] = True
+        self._has_column |= fresh
         self._beside += new + cost_of_terms(len(beside), *self._measures)
         return terms, self._low_rank.set_terms(terms, framed)
 

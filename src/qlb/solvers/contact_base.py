@@ -14,7 +14,7 @@ PARTS = ("keys", "sliding", "nodes", "vectors", "stiffness")
 
 SAME = 2.0  # times stiffer or softer than in the factor is near enough
 SMALL = 0.1  # of the stiffness of the bodies: what is softer need not be right
-SHIFTED = 0.01  # squared change of the weights of a contact's nodes, from which on it is another contact
+SHIFTED = 0.03  # squared change of the weights of a contact's nodes, from which on it is another contact
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class ContactMatrix:
         self._stencils: IntArray = np.empty((0, 4), dtype=np.int32)
         self._map = _native.PatternMap(system.pattern, system.pattern)
         self._matrix = _native.BlockMatrix(system.pattern)
-        self._scripted = (system.held.fixed != 0).all(axis=1)
+        self._scripted = (system.held.fixed != 0).all(axis=1).astype(np.uint8)
 
     def assemble(
         self, elastic: _native.BlockMatrix, contact: ContactPoint | _native.RankOneTerms, x: FloatArray
@@ -42,36 +42,33 @@ class ContactMatrix:
 
         `cholesky` is another one afterwards where the pattern had to be extended.
         """
-        nodes, blocks = self._onto_free(*self._stencil_blocks(contact, x))
+        if isinstance(contact, _native.RankOneTerms):
+            terms, stencils, blocks = contact, np.empty((0, 4), dtype=np.int32), np.empty((0, 12, 12))
+        else:  # friction is of contacts that were, which need not be contacts now
+            terms, (stencils, blocks) = contact.sliding_terms(), self._blocks(contact, x)
+        nodes = np.concatenate([stencils, self._onto_free(terms.nodes)])
         if not self._holds(nodes).all():
             self._extend(nodes)
         self._matrix.set_from(self._map, elastic)
-        self._matrix.add_stencils(nodes, blocks)
+        self._matrix.add_stencils(stencils, blocks)
+        self._matrix.add_rank_one(terms, self._scripted)
         return self._matrix
 
-    def _stencil_blocks(
-        self, contact: ContactPoint | _native.RankOneTerms, x: FloatArray
-    ) -> tuple[IntArray, FloatArray]:
-        """Stencils (k, 4) and their blocks (k, 12, 12)."""
-        if isinstance(contact, _native.RankOneTerms):
-            return contact.nodes, _blocks(contact)
-        model = self._system.contact
+    def _blocks(self, contact: ContactPoint, x: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Free stencils (k, 4) of contacts without friction, and their blocks (k, 12, 12), zero at scripted nodes."""
+        model, nodes = self._system.contact, contact.contacts.nodes
         assert model is not None
-        nodes, blocks = contact.contacts.nodes, model.barrier.hessian_blocks(x, contact.contacts, True)
-        if contact.friction is None:  # else of contacts that were, which need not be contacts now
-            return nodes, blocks
-        sliding = contact.sliding_terms()
-        return np.concatenate([nodes, sliding.nodes]), np.concatenate([blocks, _blocks(sliding)])
+        blocks = model.barrier.hessian_blocks(x, contact.contacts, True)
+        keep = np.repeat(self._scripted[nodes] == 0, 3, axis=1)
+        return self._onto_free(nodes), blocks if keep.all() else blocks * (keep[:, :, None] & keep[:, None, :])
 
-    def _onto_free(self, nodes: IntArray, blocks: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Stencils in which nodes that are wholly scripted give way to another of the stencil, with nothing in it."""
-        scripted = self._scripted[nodes]
+    def _onto_free(self, nodes: IntArray) -> IntArray:
+        """Stencils in which nodes that are wholly scripted give way to another of the stencil."""
+        scripted = self._scripted[nodes] != 0
         if not scripted.any():
-            return nodes, blocks
+            return nodes
         first_free = np.argmin(scripted, axis=1)
-        nodes = np.where(scripted, nodes[np.arange(len(nodes)), first_free][:, None], nodes)
-        keep = np.repeat(~scripted, 3, axis=1)
-        return np.ascontiguousarray(nodes), blocks * (keep[:, :, None] & keep[:, None, :])
+        return np.ascontiguousarray(np.where(scripted, nodes[np.arange(len(nodes)), first_free][:, None], nodes))
 
     def _holds(self, nodes: IntArray) -> BoolArray:
         """Which of the stencils (k, 4) the pattern has all blocks of."""
@@ -82,7 +79,7 @@ class ContactMatrix:
 
     def fits(self, nodes: IntArray) -> BoolArray:
         """Which of the stencils (k, 4) need no extension."""
-        return self._holds(self._onto_free(nodes, np.zeros((len(nodes), 12, 12)))[0])
+        return self._holds(self._onto_free(nodes))
 
     @property
     def stencils(self) -> IntArray:
@@ -105,12 +102,6 @@ class ContactMatrix:
         self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
         self._map = _native.PatternMap(system.pattern, self._pattern)
         self._matrix = _native.BlockMatrix(self._pattern)
-
-
-def _blocks(terms: _native.RankOneTerms) -> FloatArray:
-    """Each term as a matrix, shape (k, 12, 12)."""
-    a = terms.vectors.reshape(-1, 12)
-    return np.asarray(terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :])
 
 
 def _keys(pattern: _native.BlockPattern) -> np.ndarray:

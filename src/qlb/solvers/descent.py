@@ -109,10 +109,8 @@ class Descent(ABC):
         """
         log = _Log(problem, self)
         if earlier is None:
+            reference = problem.residual(problem.value_gradient(problem.start)[1])
             log.add(self._initial_point(problem), 0.0)
-            reference = log.point.residual
-            if log.point.x is not problem.start:
-                reference = problem.residual(problem.value_gradient(problem.start)[1])
         else:
             log.rows, log.point = list(earlier.rows), Point.at(problem, earlier.positions)
             reference = earlier.reference

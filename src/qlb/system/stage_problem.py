@@ -61,7 +61,7 @@ class StageProblem:
         self._target = stage.x_b + stage.c / max(self._mass_scale, 1.0) * stage.v_b
         self._guess = self.predictor if guess is None else guess
         at_stage = {term: potential for term in system.terms if (potential := term.at(stage, self._guess)) is not None}
-        self._potentials = [*system.potentials, *at_stage.values()]
+        self._terms = list(at_stage.values())
         self._added = [at_stage[term] for term in system.added if term in at_stage]
         self.origin = origin or Origin(state.positions, state.time)
         self._last: tuple[FloatArray, float, FloatArray] | None = None
@@ -150,9 +150,11 @@ class StageProblem:
         """
         if self._last is not None and np.array_equal(self._last[0], x):
             return self._last[1:]
-        system, gradient, energy = self.system, np.zeros(x.shape), 0.0
+        system = self.system
         with self.timer.section("gradient"):
-            for potential in self._potentials:
+            energy, stored = system.stored_energy(x, self.force_scale)
+            gradient = stored.copy()
+            for potential in self._terms:
                 energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
@@ -170,7 +172,7 @@ class StageProblem:
             system = self.system
             matrix = matrix or _native.BlockMatrix(system.pattern)
             matrix.set_zero(system.threads)
-            for potential in self._potentials:
+            for potential in (*system.potentials, *self._terms):
                 potential.add_hessian(x, self.force_scale, project, matrix)
             if self.stage.inertial:
                 system.inertia.add_hessian(self._mass_scale, matrix)

@@ -104,6 +104,7 @@ class System:
         self.inertia = _native.Inertia(row_begin, columns, values, self.pattern, threads)
         self.mass: FloatArray = _row_sums(row_begin, values)
         self.gravity = Gravity(self.mass, gravity, mesh.positions, threads)
+        self._last_stored: tuple[FloatArray, float, float, FloatArray] | None = None
         self.added = [energy.term(mesh, self.pattern, threads) for energy in energies]
         self.terms: list[Term] = [self.gravity, *self._damping_terms(), *self.added]
         modulus = whole.per_element(lambda m: m.modulus())
@@ -172,6 +173,18 @@ class System:
     def planes(self) -> tuple[Plane, ...]:
         """The half-spaces, which have no nodes."""
         return self.assembly.planes
+
+    def stored_energy(self, x: FloatArray, scale: float) -> tuple[float, FloatArray]:
+        """The sum of `potentials` at positions `x` (n, 3) [m], and its gradient, both times `scale`; not to be changed.
+
+        What was found last is not worked out again: where a step ends the next one begins.
+        """
+        last = self._last_stored
+        if last is None or last[1] != scale or not np.array_equal(last[0], x):
+            gradient = np.zeros(x.shape)
+            energy = 0.0 + sum(part.add_value_gradient(x, scale, gradient) for part in self.potentials)
+            last = self._last_stored = x.copy(), scale, energy, gradient
+        return last[2], last[3]
 
     def clear_held(self, gradient: FloatArray) -> FloatArray:
         """Zero the entries of `gradient` (n, 3) that belong to held degrees of freedom, in place."""
