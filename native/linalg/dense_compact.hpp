@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstring>
+#include <type_traits>
 
 #include "linalg/compact_layout.hpp"
 #include "linalg/dense_solve.hpp"
@@ -28,7 +29,7 @@ inline V load_small(const std::int16_t* from) {
 // Of a stream this far ahead, past the page that the processor itself would stop at.
 constexpr std::int64_t kAhead = 8192;
 
-template <int bytes>
+template <class V, int bytes>
 inline void prefetch(const void* from) {
 #pragma GCC unroll 8
   for (int k = 0; k < bytes; k += 64) __builtin_prefetch(static_cast<const std::byte*>(from) + kAhead + k);
@@ -67,7 +68,7 @@ template <class V>
 inline void subtract_tiles(const std::int16_t* from, std::int64_t tiles, int n, const float* coefficients, float* x) {
   with_width<kBlock>(n, [&]<int width>() {
     for (std::int64_t t = 0; t < tiles; ++t, from += width * kTileHeight, x += kTileHeight) {
-      prefetch<2 * width * kTileHeight>(from);
+      prefetch<V, 2 * width * kTileHeight>(from);
       subtract_tile<V, width>(from, coefficients, x);
     }
   });
@@ -114,7 +115,7 @@ inline void dot_tiles(const std::int16_t* from, std::int64_t tiles, int n, const
 #pragma GCC unroll 16
   for (int c = 0; c < columns; ++c) sum[c] = V(0.0f);
   for (std::int64_t t = 0; t < tiles; ++t, from += n * kTileHeight, x += kTileHeight) {
-    prefetch<2 * columns * kTileHeight>(from);
+    prefetch<V, 2 * columns * kTileHeight>(from);
 #pragma GCC unroll 4
     for (int i = 0; i < M; ++i) {
       const V side = V::load_unaligned(x + i * kLanes<V>);
@@ -139,18 +140,21 @@ inline void subtract_dots(const std::int16_t* from, std::int64_t tiles, int n, c
   for (int p = 0; p < n; ++p) x[p] -= scale[p] * sums[p];
 }
 
-// The parts of a block of columns.
-template <class V>
+// The parts of a block of columns, to be read, or written where Byte is not const.
+template <class V, class Byte = const std::byte>
 struct CompactBlock {
-  CompactBlock(const CompactLayout& layout, const std::byte* block, std::int64_t j)
+  template <class T>
+  using Part = std::conditional_t<std::is_const_v<Byte>, const T*, T*>;
+
+  CompactBlock(const CompactLayout& layout, Byte* block, std::int64_t j)
       : width(static_cast<int>(layout.width(j))),
-        inverse(reinterpret_cast<const float*>(block + layout.own(j))),
+        inverse(reinterpret_cast<Part<float>>(block + layout.own(j))),
         scale(inverse + kBlock * width),
-        own(reinterpret_cast<const std::int16_t*>(scale + kBlock)),
-        below(reinterpret_cast<const std::int16_t*>(block + layout.below(j))) {}
+        own(reinterpret_cast<Part<std::int16_t>>(scale + kBlock)),
+        below(reinterpret_cast<Part<std::int16_t>>(block + layout.below(j))) {}
   int width;
-  const float *inverse, *scale;
-  const std::int16_t *own, *below;
+  Part<float> inverse, scale;
+  Part<std::int16_t> own, below;
 };
 
 template <class V>
@@ -248,18 +252,17 @@ void compact_pack(const CompactLayout& layout, const float* panel, std::byte* bl
   constexpr float most_steps = 32767.0f, vanishing = 1e-30f;
   const std::int64_t ld = layout.front;
   for (std::int64_t j = layout.begin; j < layout.end; j += kBlock) {
-    const CompactBlock<V> at(layout, block, j);
-    auto *inverse = const_cast<float*>(at.inverse), *scale = const_cast<float*>(at.scale);
+    const CompactBlock<V, std::byte> at(layout, block, j);
     float steps[kBlock];
     const float *columns = panel + j * ld, *below = columns + j + at.width;
     for (int p = 0; p < at.width; ++p) {
-      for (int k = 0; k < kBlock; ++k) inverse[p * kBlock + k] = k < at.width ? columns[j + k + p * ld] : 0.0f;
+      for (int k = 0; k < kBlock; ++k) at.inverse[p * kBlock + k] = k < at.width ? columns[j + k + p * ld] : 0.0f;
       const float most = largest<V>(below + p * ld, ld - j - at.width);
-      scale[p] = most > vanishing ? most / most_steps : 0.0f;
+      at.scale[p] = most > vanishing ? most / most_steps : 0.0f;
       steps[p] = most > vanishing ? most_steps / most : 0.0f;
     }
-    pack_tiles<V>(below, ld, layout.end - j - at.width, steps, at.width, const_cast<std::int16_t*>(at.own));
-    pack_tiles<V>(columns + layout.end, ld, ld - layout.end, steps, at.width, const_cast<std::int16_t*>(at.below));
+    pack_tiles<V>(below, ld, layout.end - j - at.width, steps, at.width, at.own);
+    pack_tiles<V>(columns + layout.end, ld, ld - layout.end, steps, at.width, at.below);
   }
 }
 

@@ -16,7 +16,8 @@ namespace {
 constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kSmallPanel = 24 * 1024;  // entries; a larger panel is cut up for the cache and for threads
 constexpr double kThreadedFlops = 5e7, kThreadedEntries = 5e5;  // less in all is not worth a second thread
-constexpr double kSharedFlops = 4e6;          // a front of fewer operations is not worth the team's waiting
+constexpr double kThreadedCompact = 2e7;  // of the compact copy, which one core reads as fast as two while it is small
+constexpr double kSharedFlops = 4e6;      // a front of fewer operations is not worth the team's waiting
 constexpr std::int64_t kColumnsPerTask = 32;  // of a matrix that is cleared or added up by a team
 
 std::int64_t rounded(std::int64_t n) {
@@ -75,7 +76,8 @@ void SupernodalFactor<T>::plan(int threads) {
     longest = std::max(longest, supernodes_.front(s));
   }
   factor_threads_ = std::accumulate(flops.begin(), flops.end(), 0.0) < kThreadedFlops ? 1 : threads;
-  solve_threads_ = std::accumulate(entries.begin(), entries.end(), 0.0) < kThreadedEntries ? 1 : threads;
+  const double enough = compact_.size() > 0 ? kThreadedCompact : kThreadedEntries;
+  solve_threads_ = std::accumulate(entries.begin(), entries.end(), 0.0) < enough ? 1 : threads;
   factor_schedule_ = make_schedule(supernodes_, flops, factor_threads_, 4.0);
   solve_schedule_ = make_schedule(supernodes_, entries, solve_threads_, 2.0);
   updates_ = place_blocks(supernodes_, factor_schedule_, update_size);
