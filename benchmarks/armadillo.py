@@ -29,7 +29,8 @@ def table(path: Path, cases: Sequence[str], *, steps: int, threads: int, repeats
 
 def pulled(mesh: TetMesh, overrides: Sequence[str]) -> Simulation:
     """The lowest twentieth of the body held, its ends along x moved outwards."""
-    simulation = Simulation(mesh, **load_scene("bar", overrides).simulation_arguments())
+    scene = load_scene("bar", overrides)
+    simulation = Simulation(mesh, **scene.simulation_arguments() | scene.composition())
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     margin = 0.04 * (high - low)
     simulation.pin(mesh.nodes_where(lambda x: x[:, 1] < low[1] + margin[1]))

@@ -20,8 +20,9 @@ OTHERS = {
 
 
 def variations() -> dict[str, tuple[str, ...]]:
-    """Settings of each variation: the rows of the supplement's figures, each once, and more of our own."""
-    rows = {row.overrides: row.label for figure in FIGURES.values() for row in figure.rows}
+    """Settings of each variation: the rows of the supplement's figures of the bar, each once, and more of our own."""
+    figures = [figure for figure in FIGURES.values() if figure.scene == "bar"]
+    rows = {row.overrides: row.label for figure in figures for row in figure.rows}
     defaults = {("material.poisson=0.49",), ("heterogeneous=false",), ("anisotropic=false",), ("integrator=BDF2",)}
     return {label: overrides for overrides, label in rows.items() if overrides not in defaults} | OTHERS
 
