@@ -1,4 +1,4 @@
-// Products of a node's three columns (NodeColumns). Products of floats are summed in double.
+// Products of a node's three columns (NodeColumns). Of floats they are summed in double, at least from part to part.
 #pragma once
 
 #include "linalg/dense_solve.hpp"
@@ -23,29 +23,79 @@ inline D load_doubles(const float* from) {
 #endif
 }
 
-// g (3 x 3, row by row) = A^T B, A and B (rows x 3), with kPadding zeros below each column. Summed in T over kPart
-// rows, then in double.
+#if defined(__AVX512F__)
+// The sum of the lanes of v[i] at 4 (i mod 4) + i/4. Of AVX-512 the foundation alone; xsimd's haddp takes more.
+inline __m512 sums_of_sixteen(const __m512 (&v)[16]) {
+  constexpr int low = _MM_SHUFFLE(1, 0, 1, 0), high = _MM_SHUFFLE(3, 2, 3, 2);
+  constexpr int even = _MM_SHUFFLE(2, 0, 2, 0), odd = _MM_SHUFFLE(3, 1, 3, 1);
+  __m512 half[8], quarter[4], eighth[2];
+#pragma GCC unroll 8
+  for (int k = 0; k < 8; ++k)
+    half[k] = _mm512_add_ps(_mm512_shuffle_f32x4(v[2 * k], v[2 * k + 1], low),
+                            _mm512_shuffle_f32x4(v[2 * k], v[2 * k + 1], high));
+#pragma GCC unroll 4
+  for (int k = 0; k < 4; ++k)
+    quarter[k] = _mm512_add_ps(_mm512_shuffle_f32x4(half[2 * k], half[2 * k + 1], even),
+                               _mm512_shuffle_f32x4(half[2 * k], half[2 * k + 1], odd));
+#pragma GCC unroll 2
+  for (int k = 0; k < 2; ++k)
+    eighth[k] = _mm512_add_ps(_mm512_shuffle_ps(quarter[2 * k], quarter[2 * k + 1], even),
+                              _mm512_shuffle_ps(quarter[2 * k], quarter[2 * k + 1], odd));
+  return _mm512_add_ps(_mm512_shuffle_ps(eighth[0], eighth[1], even), _mm512_shuffle_ps(eighth[0], eighth[1], odd));
+}
+#endif
+
+// to += the sums of the lanes of nine vectors, always in the same way.
 template <class V, class T>
-void gram3(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g) {
-  constexpr std::int64_t kPart = 16 * kLanes<V>;
-  for (int k = 0; k < 9; ++k) g[k] = 0.0;
+inline void add_lane_sums(const V (&v)[9], double* to) {
+#if defined(__AVX512F__)
+  if constexpr (kLanes<V> == 16) {
+    const __m512 zero = _mm512_setzero_ps();
+    alignas(64) float sums[16];
+    _mm512_store_ps(sums, sums_of_sixteen({v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], zero, zero, zero, zero,
+                                           zero, zero, zero}));
+    for (int k = 0; k < 9; ++k) to[k] += sums[4 * (k % 4) + k / 4];
+    return;
+  }
+#endif
+  for (int k = 0; k < 9; ++k) to[k] += sum_of_lanes<V, T>(v[k]);
+}
+
+// As gram3 below, for A of `nodes` nodes; a node's result does not depend on which others there are.
+template <class V, int nodes, class T>
+inline void gram_of(const T* const* a, const std::int64_t* lda, const T* b, std::int64_t ldb, std::int64_t rows,
+                    double* g) {
+  constexpr std::int64_t kPart = 64 * kLanes<V>;
+  for (int k = 0; k < 9 * nodes; ++k) g[k] = 0.0;
   for (std::int64_t first = 0; first < rows; first += kPart) {
     const std::int64_t last = rows - first < kPart ? rows : first + kPart;
-    V sum[3][3];
-#pragma GCC unroll 9
-    for (int k = 0; k < 9; ++k) sum[k / 3][k % 3] = V(T(0));
+    V sum[nodes][9];
+#pragma GCC unroll 18
+    for (int k = 0; k < 9 * nodes; ++k) sum[k / 9][k % 9] = V(T(0));
     for (std::int64_t i = first; i < last; i += kLanes<V>) {
-      const V x[3] = {V::load_unaligned(a + i), V::load_unaligned(a + i + lda), V::load_unaligned(a + i + 2 * lda)};
+      const V y[3] = {V::load_unaligned(b + i), V::load_unaligned(b + i + ldb), V::load_unaligned(b + i + 2 * ldb)};
+#pragma GCC unroll 6
+      for (int k = 0; k < 3 * nodes; ++k) {
+        const int m = k / 3, c = k % 3;
+        const V x = V::load_unaligned(a[m] + i + c * lda[m]);
 #pragma GCC unroll 3
-      for (int d = 0; d < 3; ++d) {
-        const V y = V::load_unaligned(b + i + d * ldb);
-#pragma GCC unroll 3
-        for (int c = 0; c < 3; ++c) sum[c][d] = xsimd::fma(x[c], y, sum[c][d]);
+        for (int d = 0; d < 3; ++d) sum[m][3 * c + d] = xsimd::fma(x, y[d], sum[m][3 * c + d]);
       }
     }
-#pragma GCC unroll 9
-    for (int k = 0; k < 9; ++k) g[k] += sum_of_lanes<V, T>(sum[k / 3][k % 3]);
+#pragma GCC unroll 2
+    for (int m = 0; m < nodes; ++m) add_lane_sums<V, T>(sum[m], g + 9 * m);
   }
+}
+
+// g (few, 3, 3) = A_m^T B, A_m and B (rows x 3), with kPadding zeros below each column. Summed in T over kPart rows,
+// then in double.
+template <class V, class T>
+void gram3(const T* const* a, const std::int64_t* lda, int few, const T* b, std::int64_t ldb, std::int64_t rows,
+           double* g) {
+  int m = 0;
+  if constexpr (kManyRegisters<V>)
+    for (; m + 2 <= few; m += 2) gram_of<V, 2>(a + m, lda + m, b, ldb, rows, g + 9 * m);
+  for (; m < few; ++m) gram_of<V, 1>(a + m, lda + m, b, ldb, rows, g + 9 * m);
 }
 
 // t (3) += A^T y.
@@ -81,20 +131,6 @@ void subtract3(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t
   if (const int rest = static_cast<int>(rows - i); rest > 0)
     store_part<V>(changed(load_part<V>(y + i, rest), i, [&](const T* p) { return load_part<V>(p, rest); }), y + i,
                   rest);
-}
-
-// out = the sum of 3 count rows of doubles, `ld` apart by three, each times its weight; length in whole vectors.
-template <class V>
-void combine3(const double* const* rows, std::int64_t ld, const double* w, int count, std::int64_t length,
-              double* out) {
-  using D = xsimd::batch<double, typename V::arch_type>;
-  for (std::int64_t i = 0; i < length; i += kLanes<D>) {
-    D sum(0.0);
-    for (int k = 0; k < count; ++k)
-#pragma GCC unroll 3
-      for (int c = 0; c < 3; ++c) sum = xsimd::fma(D(w[3 * k + c]), D::load_unaligned(rows[k] + c * ld + i), sum);
-    sum.store_unaligned(out + i);
-  }
 }
 
 }  // namespace qlb::dense

@@ -6,6 +6,7 @@
 #include "linalg/dense_compact.hpp"
 #include "linalg/dense_front.hpp"
 #include "linalg/dense_solve.hpp"
+#include "linalg/dense_terms.hpp"
 #include "linalg/dense_vectors.hpp"
 #include "simd/arch.hpp"
 
@@ -40,7 +41,8 @@ const DenseKernels<T>* make_dense_kernels(const char* level) {
                                           dense::gram3<V, T>,
                                           dense::dots3<V, T>,
                                           dense::subtract3<V, T>,
-                                          dense::combine3<V>,
+                                          dense::multiply_terms<V, T>,
+                                          dense::dot_terms<V, T>,
                                           dense::dot<V, T>,
                                           dense::add_scaled<V, T>,
                                           make_compact_kernels<T>()};

@@ -17,6 +17,7 @@ constexpr int kTask = 384;      // rows and columns of the pieces that threads s
 constexpr int kDepth = 256;     // depth of a product that is packed at once
 constexpr int kPadding = 16;    // entries that kernels may read past a matrix; its values do not matter but are finite
 constexpr int kRightSides = 8;  // right-hand sides solved together
+constexpr int kTermBlock = 16;  // terms multiplied together
 
 // Entries of the work space that `subtract` and `solve_rows` need.
 constexpr std::int64_t kWorkEntries = 2 * (kTask + 48) * kDepth + 64 * kWide;
@@ -33,6 +34,13 @@ struct CompactKernels {
                         float* x);
   void (*backward_above)(const CompactLayout& layout, const std::byte* block, std::int64_t j, float* x);
   void (*backward_own)(const CompactLayout& layout, const std::byte* block, float* x);
+};
+
+// A vector u with three entries for each of up to four nodes, whose columns these are: 3 column[k] + (0, 1, 2).
+struct NodeTerm {
+  int count = 0;
+  std::int32_t column[4];
+  double u[4][3];
 };
 
 template <class T>
@@ -65,15 +73,18 @@ struct DenseKernels {
   void (*backward_own)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, T* x, std::int64_t ldx,
                        int sides);
 
-  // Of three columns each, `lda` or `ldb` apart: g (3 x 3, row by row) = A^T B, with
-  // kPadding zeros below each column; t (3) += A^T y; y -= A c.
-  void (*gram3)(const T* a, std::int64_t lda, const T* b, std::int64_t ldb, std::int64_t rows, double* g);
+  // Of three columns each, `lda` or `ldb` apart: g (few, 3 x 3, row by row) = A_m^T B of `few` such A, with kPadding
+  // zeros below each column; t (3) += A^T y; y -= A c.
+  void (*gram3)(const T* const* a, const std::int64_t* lda, int few, const T* b, std::int64_t ldb, std::int64_t rows,
+                double* g);
   void (*dots3)(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t);
   void (*subtract3)(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t rows);
-  // out (length, a multiple of kPadding) = the sum of 3 count rows, each times its weight in w (count, 3): rows[k],
-  // rows[k] + ld and rows[k] + 2 ld.
-  void (*combine3)(const double* const* rows, std::int64_t ld, const double* w, int count, std::int64_t length,
-                   double* out);
+  // G u for `count` (<= kTermBlock) terms u, G (length, length) with rows `ld` apart: out (length, kTermBlock), the terms
+  // side by side, and what stands in `work` (kTermBlock, length) for those that lack; length a multiple of kPadding.
+  // Then u^T of another term with all of them, kTermBlock sums.
+  void (*multiply_terms)(const NodeTerm* const* terms, int count, const T* matrix, std::int64_t ld, std::int64_t length,
+                         T* work, T* out);
+  void (*dot_terms)(const NodeTerm& term, const T* products, double* sums);
 
   T (*dot)(const T* a, const T* b, std::int64_t n);
   void (*add_scaled)(T scale, const T* a, T* b, std::int64_t n);  // b += scale a

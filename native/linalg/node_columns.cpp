@@ -3,13 +3,16 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace qlb {
 namespace {
 constexpr std::int64_t kRowsPerTask = 1024, kColumnsPerTask = 8;
-constexpr double kNotMade = std::numeric_limits<double>::quiet_NaN();
+template <class T>
+constexpr T kNotMade = std::numeric_limits<T>::quiet_NaN();
 }  // namespace
 
 template <class T>
@@ -35,7 +38,7 @@ bool NodeColumns<T>::held(std::int32_t node) const {
 
 template <class T>
 std::int64_t NodeColumns<T>::bytes() const {
-  std::int64_t sum = static_cast<std::int64_t>(gram_.size() * sizeof(double));
+  std::int64_t sum = static_cast<std::int64_t>(gram_.size() * sizeof(T));
   for (const Column& column : columns_) sum += static_cast<std::int64_t>(column.values.size() * sizeof(T));
   return sum;
 }
@@ -109,39 +112,70 @@ void NodeColumns<T>::solve_sides(std::span<const Side> sides, typename Supernoda
 template <class T>
 void NodeColumns<T>::make(std::span<const std::int32_t> nodes) {
   const std::vector<Side> sides = add_columns(nodes);
-  const auto batches = (static_cast<std::int64_t>(sides.size()) + kRightSides - 1) / kRightSides;
+  constexpr std::int64_t together = SupernodalFactor<T>::kPathSides;
+  const auto batches = (static_cast<std::int64_t>(sides.size()) + together - 1) / together;
   if (batches == 0) return;
   while (static_cast<int>(work_.size()) < threads_) work_.emplace_back(factor_);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_) if (batches > 1 && threads_ > 1)
   for (std::int64_t k = 0; k < batches; ++k) {
-    const std::size_t begin = k * kRightSides;
-    solve_sides(std::span(sides).subspan(begin, std::min<std::size_t>(kRightSides, sides.size() - begin)),
+    const std::size_t begin = k * together;
+    solve_sides(std::span(sides).subspan(begin, std::min<std::size_t>(together, sides.size() - begin)),
                 work_[omp_get_thread_num()]);
   }
 }
 
-// Up to the root, from the first supernode of both on.
+// Up to the root, from the first supernode on that is on the way up from both.
 template <class T>
-std::int64_t NodeColumns<T>::common_rows(const Column& a, const Column& b) const {
-  std::int32_t s = a.supernode, other = b.supernode;
-  while (s != other) {
-    std::int32_t& lower = s < other ? s : other;
+std::int64_t NodeColumns<T>::rows_in_common(std::int32_t s, std::int32_t t) const {
+  while (s != t) {
+    std::int32_t& lower = s < t ? s : t;
     lower = supernodes_.parent[lower];
     if (lower < 0) return 0;
   }
-  return std::min({a.rows, b.rows, rows_to_root_[s]});
+  return rows_to_root_[s];
+}
+
+// The blocks of `few` columns with column j, as far as they are not there yet: together where they share as many rows.
+template <class T>
+void NodeColumns<T>::make_gram(std::span<const std::int32_t> few, std::int32_t j) {
+  std::array<std::int32_t, kColumnsPerTask> alike;
+  std::size_t count = 0;
+  std::int64_t rows = 0, shared = 0;
+  std::int32_t last = -1;
+  for (const std::int32_t i : few) {
+    if (!std::isnan(gram_row(i, 0)[3 * std::int64_t{j}])) continue;
+    if (columns_[i].supernode != last) shared = rows_in_common(last = columns_[i].supernode, columns_[j].supernode);
+    const std::int64_t here = std::min({columns_[i].rows, columns_[j].rows, shared});
+    if (count > 0 && here != rows) {
+      make_gram({alike.data(), count}, j, rows);
+      count = 0;
+    }
+    rows = here;
+    alike[count++] = i;
+  }
+  if (count > 0) make_gram({alike.data(), count}, j, rows);
 }
 
 template <class T>
-void NodeColumns<T>::make_gram(std::int32_t i, std::int32_t j) {
-  const Column &a = columns_[i], &b = columns_[j];
-  double g[9] = {};
-  const std::int64_t rows = common_rows(a, b);
-  if (rows > 0)
-    factor_.kernels().gram3(a.values.data() + a.rows - rows, a.ld, b.values.data() + b.rows - rows, b.ld, rows, g);
-  const std::int64_t ld = 3 * capacity_, at_i = 3 * std::int64_t{i}, at_j = 3 * std::int64_t{j};
-  for (int c = 0; c < 3; ++c)
-    for (int d = 0; d < 3; ++d) gram_[(at_i + c) * ld + at_j + d] = gram_[(at_j + d) * ld + at_i + c] = g[3 * c + d];
+void NodeColumns<T>::make_gram(std::span<const std::int32_t> few, std::int32_t j, std::int64_t rows) {
+  std::array<const T*, kColumnsPerTask> from;
+  std::array<std::int64_t, kColumnsPerTask> from_ld;
+  double g[9 * kColumnsPerTask];
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const Column& column = columns_[few[k]];
+    from[k] = column.values.data() + column.rows - rows;
+    from_ld[k] = column.ld;
+  }
+  const Column& to = columns_[j];
+  factor_.kernels().gram3(from.data(), from_ld.data(), static_cast<int>(few.size()), to.values.data() + to.rows - rows,
+                          to.ld, rows, g);
+  const std::int64_t ld = gram_length(), at_j = 3 * std::int64_t{j};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const std::int64_t at_i = 3 * std::int64_t{few[k]};
+    for (int c = 0; c < 3; ++c)
+      for (int d = 0; d < 3; ++d)
+        gram_[(at_i + c) * ld + at_j + d] = gram_[(at_j + d) * ld + at_i + c] = static_cast<T>(g[9 * k + 3 * c + d]);
+  }
 }
 
 template <class T>
@@ -149,7 +183,7 @@ void NodeColumns<T>::reserve_gram() {
   if (count() <= capacity_) return;
   const std::int64_t wanted = std::max({std::int64_t{32}, count(), capacity_ + capacity_ / 2});
   const std::int64_t capacity = (wanted + kPadding - 1) / kPadding * kPadding, ld = 3 * capacity_;
-  Aligned<double> gram(9 * capacity * capacity, kNotMade);
+  Aligned<T> gram(9 * capacity * capacity, kNotMade<T>);
   for (std::int64_t k = 0; k < ld; ++k) std::copy_n(gram_.data() + k * ld, ld, gram.data() + k * 3 * capacity);
   gram_ = std::move(gram);
   capacity_ = capacity;
@@ -160,7 +194,9 @@ void NodeColumns<T>::join(std::span<const std::int32_t> columns) {
   reserve_gram();
   std::vector<std::int32_t> ids(columns.begin(), columns.end());
   std::sort(ids.begin(), ids.end(),
-            [&](std::int32_t a, std::int32_t b) { return joined_[a] != joined_[b] ? joined_[a] > joined_[b] : a < b; });
+            [&](std::int32_t a, std::int32_t b) {
+              return std::tuple(!joined_[a], first_row(a)) < std::tuple(!joined_[b], first_row(b));
+            });
   const auto count = static_cast<std::int64_t>(ids.size());
   const std::int64_t known =
       std::find_if(ids.begin(), ids.end(), [&](std::int32_t k) { return !joined_[k]; }) - ids.begin();
@@ -168,21 +204,21 @@ void NodeColumns<T>::join(std::span<const std::int32_t> columns) {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads_) if (threads_ > 1)
   for (std::int64_t first = known; first < count; first += kColumnsPerTask) {
     const std::int64_t last = std::min(count, first + kColumnsPerTask);
-    for (std::int64_t b = 0; b < last; ++b)
-      for (std::int64_t a = std::max(first, b); a < last; ++a)
-        if (std::isnan(*(gram_row(ids[a], 0) + 3 * std::int64_t{ids[b]}))) make_gram(ids[a], ids[b]);
+    for (std::int64_t b = 0; b < last; ++b) {
+      const std::int64_t from = std::max(first, b);
+      make_gram(std::span(ids).subspan(from, last - from), ids[b]);
+    }
   }
   std::fill(joined_.begin(), joined_.end(), 0);
   for (const std::int32_t k : ids) joined_[k] = 1;
 }
 
 template <class T>
-void NodeColumns<T>::gram_product(const std::int32_t* columns, const double* u, int few, double* out) const {
-  const double* rows[4];
-  for (int k = 0; k < few; ++k) rows[k] = gram_row(columns[k], 0);
+void NodeColumns<T>::gram_products(std::span<const NodeTerm* const> terms, T* work, T* out) const {
   // Whole vectors, so that a column's entries are summed in one way wherever it stands.
   const std::int64_t length = (3 * count() + kPadding - 1) / kPadding * kPadding;
-  factor_.kernels().combine3(rows, gram_length(), u, few, length, out);
+  kernels().multiply_terms(terms.data(), static_cast<int>(terms.size()), gram_.data(), gram_length(), length, work,
+                           out);
 }
 
 template <class T>

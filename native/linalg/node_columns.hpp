@@ -31,10 +31,11 @@ class NodeColumns {
   std::int64_t first_row(std::int32_t column) const { return columns_[column].first; }
   std::int64_t count() const { return static_cast<std::int64_t>(columns_.size()); }
   std::int64_t bytes() const;
-  // out_j = the sum of G_ji u_i over `few` (<= 4) columns i, u (few, 3), for all columns j: 3 per column, in room for
-  // gram_length(). What stands there for columns that were not joined does not matter.
-  void gram_product(const std::int32_t* columns, const double* u, int few, double* out) const;
+  // G u for up to kTermBlock terms whose columns were joined, as DenseKernels::multiply_terms; `work` and `out` have room
+  // for kTermBlock gram_length(). What stands there for columns that were not joined does not matter.
+  void gram_products(std::span<const NodeTerm* const> terms, T* work, T* out) const;
   std::int64_t gram_length() const { return 3 * capacity_; }
+  const DenseKernels<T>& kernels() const { return factor_.kernels(); }
 
   void dots(std::span<const std::int32_t> columns, const T* y, double* t) const;      // t_k = Z^T y, each 3
   void subtract(std::span<const std::int32_t> columns, const double* c, T* y) const;  // y -= sum_k Z c_k
@@ -57,11 +58,12 @@ class NodeColumns {
   // Calls f(first row, place in the column, rows) for each range of rows of a column.
   template <class F>
   void for_each_range(const Column& column, const F& f) const;
-  std::int64_t common_rows(const Column& a, const Column& b) const;
-  void make_gram(std::int32_t i, std::int32_t j);
+  std::int64_t rows_in_common(std::int32_t s, std::int32_t t) const;
+  void make_gram(std::span<const std::int32_t> few, std::int32_t j);
+  void make_gram(std::span<const std::int32_t> few, std::int32_t j, std::int64_t rows);
   void reserve_gram();
   // Row d of the blocks G_ij, j = 0, 1, ...
-  const double* gram_row(std::int32_t i, int d) const {
+  const T* gram_row(std::int32_t i, int d) const {
     return gram_.data() + (3 * std::int64_t{i} + d) * gram_length();
   }
 
@@ -75,7 +77,7 @@ class NodeColumns {
   std::vector<std::uint8_t> joined_;                          // columns whose blocks among themselves are there
   std::vector<typename SupernodalFactor<T>::PathWork> work_;  // of each thread
   std::int64_t capacity_ = 0;
-  Aligned<double> gram_;  // (3 capacity, 3 capacity), symmetric; NaN where not made
+  Aligned<T> gram_;  // (3 capacity, 3 capacity), symmetric; NaN where not made
 };
 
 }  // namespace qlb

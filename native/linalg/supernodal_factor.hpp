@@ -52,11 +52,12 @@ class SupernodalFactor {
   // y := L^-1 y over some supernodes only, ascending, with all their ancestors; y is zero in all others.
   void forward_along(std::span<const std::int32_t> path, T* y);
 
-  // As forward_along for kRightSides vectors, work.y, in a work space of the caller's: one factor may serve several
+  // As forward_along for kPathSides vectors, work.y, in a work space of the caller's: one factor may serve several
   // threads. The bits of a vector do not depend on the others, nor on supernodes of the path where it is zero.
+  static constexpr int kPathSides = 3 * kRightSides;  // one after the other while a panel is in the cache
   struct PathWork {
     explicit PathWork(const SupernodalFactor& factor)
-        : ld(factor.supernodes_.first.back()), y(kRightSides * ld), front(kRightSides * factor.side_ld_) {}
+        : ld(factor.supernodes_.first.back()), y(kPathSides * ld), front(kRightSides * factor.side_ld_) {}
     std::int64_t ld;  // rows of y
     HugeBuffer<T> y, front;
   };
@@ -70,7 +71,7 @@ class SupernodalFactor {
   T* panel(std::int32_t s) { return panels_.data() + panel_begin_[s]; }
   const T* panel(std::int32_t s) const { return panels_.data() + panel_begin_[s]; }
   bool is_compact(int sides) const { return compact_.size() > 0 && sides == 1; }
-  void forward_sides_front(std::int32_t s, PathWork& work) const;
+  void forward_sides_front(std::int32_t s, T* sides, PathWork& work) const;
   T* update(std::int32_t s, int thread);
   T* pending(std::int32_t s, int thread);
   std::int64_t update_ld(std::int32_t s) const;

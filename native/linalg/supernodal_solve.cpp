@@ -221,15 +221,18 @@ void SupernodalFactor<T>::forward_along(std::span<const std::int32_t> path, T* y
 
 // Passes what changes straight to the rows of y: all of them lie on the path.
 template <class T>
-void SupernodalFactor<T>::forward_sides_front(std::int32_t s, PathWork& work) const {
+void SupernodalFactor<T>::forward_sides_front(std::int32_t s, T* sides, PathWork& work) const {
   const std::int64_t columns = supernodes_.columns(s), front = supernodes_.front(s), first = supernodes_.first[s];
   const T* L = panel(s);
-  T *x = work.front.data(), *y = work.y.data() + first;
+  T* x = work.front.data();
   std::int64_t begin = columns;  // what is left of the first entry that is not zero changes nothing
   for (int r = 0; r < kRightSides; ++r) {
-    const T* own = y + r * work.ld;
+    const T* own = sides + first + r * work.ld;
     begin = std::min<std::int64_t>(begin, std::find_if(own, own + columns, [](T v) { return v != T(0); }) - own);
-    std::copy_n(own, columns, x + r * side_ld_);
+  }
+  if (begin == columns) return;
+  for (int r = 0; r < kRightSides; ++r) {
+    std::copy_n(sides + first + r * work.ld, columns, x + r * side_ld_);
     std::fill_n(x + columns + r * side_ld_, front - columns, T(0));
   }
   for (std::int64_t j = begin / kBlock * kBlock; j < columns; j += kWide) {
@@ -240,7 +243,7 @@ void SupernodalFactor<T>::forward_sides_front(std::int32_t s, PathWork& work) co
   const std::int32_t* rows = supernodes_.rows(s);
   for (int r = 0; r < kRightSides; ++r) {
     const T* from = x + r * side_ld_;
-    T* to = work.y.data() + r * work.ld;
+    T* to = sides + r * work.ld;
     std::copy_n(from, columns, to + first);
     for (std::int64_t k = 0; k < front - columns; ++k) to[rows[k]] += from[columns + k];
   }
@@ -249,7 +252,8 @@ void SupernodalFactor<T>::forward_sides_front(std::int32_t s, PathWork& work) co
 template <class T>
 void SupernodalFactor<T>::forward_sides_along(std::span<const std::int32_t> path, PathWork& work) const {
   const FlushSubnormals flush;
-  for (const std::int32_t s : path) forward_sides_front(s, work);
+  for (const std::int32_t s : path)
+    for (int r = 0; r < kPathSides; r += kRightSides) forward_sides_front(s, work.y.data() + r * work.ld, work);
 }
 
 template void SupernodalFactor<float>::forward_sides_along(std::span<const std::int32_t>, PathWork&) const;

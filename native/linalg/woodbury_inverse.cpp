@@ -1,6 +1,7 @@
 #include "linalg/woodbury_inverse.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -163,27 +164,27 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
   return term;
 }
 
-// S_jl = sign_j delta_jl + sum over the nodes a of j and b of l of u_ja^T G_ab u_lb: for each l first all of G u_l.
+// S_jl = sign_j delta_jl + sum over the nodes a of j and b of l of u_ja^T G_ab u_lb: for a block of rows j first all of
+// G u_j.
 template <class T>
 void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
   const std::int64_t count = active_terms();
-#pragma omp parallel num_threads(threads_) if (threads_ > 1 && count > 32)
+#pragma omp parallel num_threads(threads_) if (threads_ > 1 && count > 2 * kTermBlock)
   {
-    std::vector<double> product(columns.gram_length());
-#pragma omp for schedule(dynamic, 4)
-    for (std::int64_t l = 0; l < count; ++l) {
-      const double* to = product.data();
-      columns.gram_product(active_[l].column, active_[l].u[0], active_[l].count, product.data());
-      double* S = small_.column(l);
-      for (std::int64_t j = l; j < count; ++j) {
-        double sum = 0.0;
-        for (int i = 0; i < active_[j].count; ++i) {
-          const double *u = active_[j].u[i], *v = to + 3 * std::int64_t{active_[j].column[i]};
-          sum += u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-        }
-        S[j] = sum;
+    Aligned<T> work(kTermBlock * columns.gram_length()), products(kTermBlock * columns.gram_length());
+    std::array<const NodeTerm*, kTermBlock> block;
+#pragma omp for schedule(dynamic, 1)
+    for (std::int64_t first = 0; first < count; first += kTermBlock) {
+      const std::int64_t end = std::min(first + kTermBlock, count);
+      for (std::int64_t j = first; j < end; ++j) block[j - first] = &active_[j];
+      columns.gram_products(std::span(block).first(end - first), work.data(), products.data());
+      double sums[kTermBlock];
+      for (std::int64_t l = 0; l < end; ++l) {
+        columns.kernels().dot_terms(active_[l], products.data(), sums);
+        const std::int64_t from = std::max(first, l);
+        std::copy(sums + (from - first), sums + (end - first), small_.column(l) + from);
       }
-      S[l] += active_[l].positive ? 1.0 : -1.0;
+      for (std::int64_t j = first; j < end; ++j) small_.column(j)[j] += active_[j].positive ? 1.0 : -1.0;
     }
   }
 }

@@ -52,14 +52,12 @@ class WoodburyInverse : public InverseOperator {
   std::int64_t bytes() const;    // that they and their products take
 
  private:
-  // A term in the frame of the factor: |k|^1/2 T_i^T a_i at up to four columns.
-  struct Active {
+  // A term in the frame of the factor: |k|^1/2 T_i^T a_i at up to four of NodeColumns.
+  struct Active : NodeTerm {
     std::int64_t term = 0;  // its number in terms_
     double root = 0.0;      // |k|^1/2
-    int count = 0;
     bool positive = true;
-    std::int32_t column[4], place[4];  // in NodeColumns; among those in use
-    double u[4][3];
+    std::int32_t place[4];  // of its columns among those in use
   };
   using AnyColumns =
       std::variant<std::monostate, std::unique_ptr<NodeColumns<float>>, std::unique_ptr<NodeColumns<double>>>;
