@@ -16,6 +16,14 @@ void bind_assembly(nb::module_& m) {
           nb::arg("nodes"), nb::arg("cliques"))
       .def_prop_ro("nodes", &BlockPattern::nodes)
       .def_prop_ro("blocks", &BlockPattern::blocks)
+      .def(
+          "holds",
+          [](const BlockPattern& p, const Array<const std::int32_t>& stencils, const Array<std::uint8_t>& out) {
+            if (stencils.size() % 4 != 0) throw std::invalid_argument("stencils must have four entries each");
+            p.holds(view(stencils), sized(out, static_cast<std::int64_t>(stencils.size() / 4), "out"));
+          },
+          nb::arg("stencils"), nb::arg("out").noconvert(), ReleaseGil(),
+          "Whether all blocks between the nodes of each stencil, shape (k, 4), are there: 0 or 1, shape (k,).")
       .def_prop_ro(
           "column_begin",
           [](const BlockPattern& p) {

@@ -89,7 +89,8 @@ void bind_change(nb::module_& m) {
       nb::arg("held_sliding"), nb::arg("inverse"), nb::arg("scale"), nb::arg("small"), nb::arg("same"),
       nb::arg("shifted"), ReleaseGil(),
       "What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of "
-      "friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor. "
+      "friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor, "
+      "ascending by them. "
       "Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the "
       "factor, and how many of these.");
 }

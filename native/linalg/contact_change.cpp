@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -17,22 +16,18 @@ namespace {
 using Vector = std::array<double, 12>;  // one for each of four nodes
 using Weights = std::array<double, 4>;
 
-// Where in `a` and `b` the keys are that both have, in ascending order of the keys.
+// Where in `a` and in `b`, which is ascending, the keys are that both have, in ascending order of the keys.
 std::vector<std::pair<std::int64_t, std::int64_t>> in_common(std::span<const std::int64_t> a,
                                                              std::span<const std::int64_t> b) {
-  const auto ascending = [](std::span<const std::int64_t> keys) {
-    std::vector<std::int64_t> order(keys.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::ranges::sort(order, {}, [&](std::int64_t k) { return keys[k]; });
-    return order;
-  };
-  std::vector<std::pair<std::int64_t, std::int64_t>> pairs;
-  const std::vector<std::int64_t> in_a = ascending(a), in_b = ascending(b);
-  for (std::size_t i = 0, j = 0; i < in_a.size() && j < in_b.size();) {
-    const std::int64_t left = a[in_a[i]], right = b[in_b[j]];
-    if (left == right) pairs.emplace_back(in_a[i], in_b[j]);
-    i += left <= right;
-    j += right <= left;
+  std::vector<std::pair<std::int64_t, std::int64_t>> keyed(a.size()), pairs;  // key and place in a
+  for (std::size_t i = 0; i < a.size(); ++i) keyed[i] = {a[i], i};
+  if (!std::ranges::is_sorted(a)) std::ranges::sort(keyed);
+  pairs.reserve(std::min(a.size(), b.size()));
+  auto next = b.begin();
+  for (const auto& [key, place] : keyed) {
+    next = std::find_if(next, b.end(), [&](std::int64_t other) { return other >= key; });
+    if (next == b.end()) break;
+    if (*next == key) pairs.emplace_back(place, next - b.begin());
   }
   return pairs;
 }
@@ -85,7 +80,9 @@ class Comparison {
     for (const auto& [here, there] : in_common(now_.keys, held_.keys)) compare_normals(here, there);
     for (const auto& [here, there] : in_common(now_.sliding, held_.sliding))
       compare_sliding(now_.keys.size() + 2 * here, held_.keys.size() + 2 * there);
-    RankOneTerms terms = now_.terms;
+    RankOneTerms terms;
+    terms.reserve(now_.terms.size() + std::ssize(change_) + turned_.size());
+    terms.add(now_.terms);
     for (std::size_t j = 0; j < lacking_.size(); ++j) terms.set_stiffness(j, lacking_[j]);
     for (std::size_t k = 0; k < change_.size(); ++k)
       if (std::abs(change_[k]) > small_) terms.add(held_.terms.nodes(k), held_.terms.all_vectors()[k], change_[k]);
@@ -164,6 +161,8 @@ ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, 
                              const Nearness& near) {
   check(now, "now");
   check(held, "held");
+  if (!std::ranges::is_sorted(held.keys) || !std::ranges::is_sorted(held.sliding))
+    throw std::invalid_argument("held: keys and sliding must be ascending");
   return Comparison(now, held, inverse, near).result();
 }
 

@@ -26,7 +26,7 @@ struct ContactChange {
   std::int64_t framed = 0;  // how many others: in the frame of the factor, negative where it has too much
 };
 
-// `held`: in the frame of the factor that `inverse` is over.
+// `held`: in the frame of the factor that `inverse` is over, its keys and sliding ascending.
 ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse,
                              const Nearness& near);
 

@@ -21,6 +21,11 @@ class BlockPattern:
     @property
     def blocks(self) -> int: ...
 
+    def holds(self, stencils: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.uint8], dict(order='C', device='cpu')]) -> None:
+        """
+        Whether all blocks between the nodes of each stencil, shape (k, 4), are there: 0 or 1, shape (k,).
+        """
+
     @property
     def column_begin(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), writable=False)]: ...
 
@@ -499,7 +504,7 @@ class WoodburyInverse(InverseOperator):
 
 def contact_change(now: RankOneTerms, keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held: RankOneTerms, held_keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held_sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
     """
-    What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
+    What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor, ascending by them. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
     """
 
 def simd_levels() -> list[str]:

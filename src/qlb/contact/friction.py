@@ -19,10 +19,11 @@ class LaggedFriction:
     ) -> None:
         """`scale`: of the forces in `contacts`; `plane_motion`: of each plane over the stage [m], shape (q, 3)."""
         mu = model.friction[contacts.groups[:, 0], contacts.groups[:, 1]]
-        self._slides = slides = np.flatnonzero(mu * contacts.force > 0)
+        slides = np.flatnonzero(mu * contacts.force > 0)
+        self._slides = slides = slides[np.argsort(contacts.key[slides])]
         self._contacts, self._scale, self._mu = contacts, scale, mu[slides]
         self.keys: LongArray = contacts.key[slides]
-        """of the pairs that slide"""
+        """of the pairs that slide, ascending"""
         self._plane = model.plane_of(contacts)[slides]
         on_plane = self._plane >= 0
         self._slip = np.zeros((len(slides), 3))

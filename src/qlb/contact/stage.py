@@ -32,7 +32,7 @@ class ContactPoint:
     sliding: FloatArray | None = None
     """the part of the gradient that is friction's, shape (n, 3)"""
     sliding_keys: LongArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """pairs of primitives that friction is of, shape (f,)"""
+    """pairs of primitives that friction is of, ascending, shape (f,)"""
     secant: FloatArray | None = None
     """by how much each friction has grown along the change of its slip since the point before, over that change (f,)"""
 

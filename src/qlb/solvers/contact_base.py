@@ -26,18 +26,21 @@ class ContactBase:
     """
 
     keys: LongArray
-    """of contacts"""
+    """of contacts, ascending"""
     sliding: LongArray
-    """of the contacts that friction is of"""
+    """of the contacts that friction is of, ascending"""
     terms: _native.RankOneTerms
     """in the frame of the factor; k = 0 for those that it does not hold"""
 
     @staticmethod
     def of(contact: ContactPoint, held: BoolArray) -> ContactBase:
         """Those of the terms at a point that are `held` (t,)."""
-        found = contact.terms()
-        terms = _native.RankOneTerms(found.nodes, found.vectors, np.where(held, found.stiffness, 0.0))
-        return ContactBase(contact.contacts.key.copy(), contact.sliding_keys.copy(), terms)
+        found, keys = contact.terms(), contact.contacts.key
+        order = np.arange(found.size)
+        order[: contact.count] = np.argsort(keys)
+        stiffness = np.where(held, found.stiffness, 0.0)[order]
+        terms = _native.RankOneTerms(found.nodes[order], found.vectors[order], stiffness)
+        return ContactBase(np.sort(keys), contact.sliding_keys.copy(), terms)
 
     @property
     def held(self) -> _native.RankOneTerms:

@@ -13,8 +13,6 @@ from qlb.system.system import CholeskyKind, Precision
 REORDER = 0.02
 """Part of the nodes in contact from which on the order of elimination of the bodies alone is no longer good enough."""
 
-_ROWS, _COLUMNS = np.tril_indices(4, -1)
-
 
 class ContactMatrix:
     """Elastic Hessian plus that of contacts, and a Cholesky analysed for their common pattern.
@@ -29,7 +27,6 @@ class ContactMatrix:
         self.cholesky = cholesky
         self._order = cholesky.node_order if isinstance(cholesky, _native.SupernodalCholesky) else None
         self._pattern = system.pattern
-        self._keys = _keys(system.pattern)
         self._stencils: IntArray = np.empty((0, 4), dtype=np.int32)
         self._map = _native.PatternMap(system.pattern, system.pattern)
         self._matrix = _native.BlockMatrix(system.pattern)
@@ -72,10 +69,9 @@ class ContactMatrix:
 
     def _holds(self, nodes: IntArray) -> BoolArray:
         """Which of the stencils (k, 4) the pattern has all blocks of."""
-        i, j = nodes[:, _ROWS].astype(np.int64), nodes[:, _COLUMNS].astype(np.int64)
-        wanted = np.minimum(i, j) * self._system.nodes + np.maximum(i, j)
-        found = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
-        return np.asarray((self._keys[found] == wanted).all(axis=1))
+        found = np.empty(len(nodes), dtype=np.uint8)
+        self._pattern.holds(nodes, found)
+        return found != 0
 
     def fits(self, nodes: IntArray) -> BoolArray:
         """Which of the stencils (k, 4) need no extension."""
@@ -95,16 +91,9 @@ class ContactMatrix:
         """Extend the pattern of the bodies for `stencils` (k, 4), distinct and ascending."""
         system, self._stencils = self._system, stencils
         self._pattern = system.extended_pattern(self._stencils)
-        self._keys = _keys(self._pattern)
         touching = len(np.unique(self._stencils))
         order = self._order if touching < REORDER * system.nodes else None
         precision: Precision = getattr(self.cholesky, "precision", "float64")
         self.cholesky = system.analyse(self._kind, precision, pattern=self._pattern, order=order)
         self._map = _native.PatternMap(system.pattern, self._pattern)
         self._matrix = _native.BlockMatrix(self._pattern)
-
-
-def _keys(pattern: _native.BlockPattern) -> np.ndarray:
-    """A number for each block, ascending."""
-    columns = np.repeat(np.arange(pattern.nodes, dtype=np.int64), np.diff(pattern.column_begin))
-    return columns * pattern.nodes + pattern.rows
