@@ -61,34 +61,58 @@ inline void add_lane_sums(const V (&v)[9], double* to) {
   for (int k = 0; k < 9; ++k) to[k] += sum_of_lanes<V, T>(v[k]);
 }
 
+// The last `count` (0 to lanes) entries of a vector; the rest is zero.
+template <class V, class T>
+inline V load_last(const T* from, int count) {
+#if defined(__AVX512F__)
+  if constexpr (sizeof(V) == 64 && sizeof(T) == 8)
+    return V(_mm512_maskz_load_pd(static_cast<__mmask8>(0xffu << (8 - count)), from));
+  else if constexpr (sizeof(V) == 64)
+    return V(_mm512_maskz_load_ps(static_cast<__mmask16>(0xffffu << (16 - count)), from));
+#endif
+  alignas(64) T buffer[kLanes<V>] = {};
+  for (int i = kLanes<V> - count; i < kLanes<V>; ++i) buffer[i] = from[i];
+  return V::load_aligned(buffer);
+}
+
 // As gram3 below, for A of `nodes` nodes; a node's result does not depend on which others there are.
 template <class V, int nodes, class T>
 inline void gram_of(const T* const* a, const std::int64_t* lda, const T* b, std::int64_t ldb, std::int64_t rows,
                     double* g) {
   constexpr std::int64_t kPart = 64 * kLanes<V>;
   for (int k = 0; k < 9 * nodes; ++k) g[k] = 0.0;
-  for (std::int64_t first = 0; first < rows; first += kPart) {
-    const std::int64_t last = rows - first < kPart ? rows : first + kPart;
+  const std::int64_t whole = (rows + kLanes<V> - 1) / kLanes<V> * kLanes<V>;
+  for (std::int64_t first = -whole; first < 0; first += kPart) {
+    const std::int64_t last = -first < kPart ? 0 : first + kPart;
     V sum[nodes][9];
-#pragma GCC unroll 18
-    for (int k = 0; k < 9 * nodes; ++k) sum[k / 9][k % 9] = V(T(0));
-    for (std::int64_t i = first; i < last; i += kLanes<V>) {
-      const V y[3] = {V::load_unaligned(b + i), V::load_unaligned(b + i + ldb), V::load_unaligned(b + i + 2 * ldb)};
+    const auto add = [&](std::int64_t i, const V& y0, const V& y1, const V& y2) {
 #pragma GCC unroll 6
       for (int k = 0; k < 3 * nodes; ++k) {
         const int m = k / 3, c = k % 3;
-        const V x = V::load_unaligned(a[m] + i + c * lda[m]);
-#pragma GCC unroll 3
-        for (int d = 0; d < 3; ++d) sum[m][3 * c + d] = xsimd::fma(x, y[d], sum[m][3 * c + d]);
+        const V x = V::load_aligned(a[m] + i + c * lda[m]);
+        sum[m][3 * c] = xsimd::fma(x, y0, sum[m][3 * c]);
+        sum[m][3 * c + 1] = xsimd::fma(x, y1, sum[m][3 * c + 1]);
+        sum[m][3 * c + 2] = xsimd::fma(x, y2, sum[m][3 * c + 2]);
       }
+    };
+#pragma GCC unroll 18
+    for (int k = 0; k < 9 * nodes; ++k) sum[k / 9][k % 9] = V(T(0));
+    std::int64_t i = first;
+    if (const auto part = static_cast<int>(rows + first + kLanes<V>); part < kLanes<V>) {
+      const T* y = b + i;
+      add(i, load_last<V>(y, part), load_last<V>(y + ldb, part), load_last<V>(y + 2 * ldb, part));
+      i += kLanes<V>;
+    }
+    for (; i < last; i += kLanes<V>) {
+      const T* y = b + i;
+      add(i, V::load_aligned(y), V::load_aligned(y + ldb), V::load_aligned(y + 2 * ldb));
     }
 #pragma GCC unroll 2
     for (int m = 0; m < nodes; ++m) add_lane_sums<V, T>(sum[m], g + 9 * m);
   }
 }
 
-// g (few, 3, 3) = A_m^T B, A_m and B (rows x 3), with kPadding zeros below each column. Summed in T over kPart rows,
-// then in double.
+// As DenseKernels says. Summed in T over kPart rows, then in double.
 template <class V, class T>
 void gram3(const T* const* a, const std::int64_t* lda, int few, const T* b, std::int64_t ldb, std::int64_t rows,
            double* g) {

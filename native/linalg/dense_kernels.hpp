@@ -73,8 +73,9 @@ struct DenseKernels {
   void (*backward_own)(const T* panel, std::int64_t ld, std::int64_t begin, std::int64_t end, T* x, std::int64_t ldx,
                        int sides);
 
-  // Of three columns each, `lda` or `ldb` apart: g (few, 3 x 3, row by row) = A_m^T B of `few` such A, with kPadding
-  // zeros below each column; t (3) += A^T y; y -= A c.
+  // Of three columns each, `lda` or `ldb` apart: g (few, 3 x 3, row by row) = A_m^T B of `few` such A, of which `a` and
+  // `b` are the ends of the first columns, multiples of kPadding as the distances; what stands above the last `rows` of
+  // a column, up to such a multiple, is finite. Then t (3) += A^T y; y -= A c.
   void (*gram3)(const T* const* a, const std::int64_t* lda, int few, const T* b, std::int64_t ldb, std::int64_t rows,
                 double* g);
   void (*dots3)(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t);

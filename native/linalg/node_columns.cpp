@@ -73,7 +73,7 @@ auto NodeColumns<T>::add_columns(std::span<const std::int32_t> nodes) -> std::ve
       }
     const std::int32_t s = owner_[first];
     const std::int64_t rows = rows_to_root_[s] - (first - supernodes_.first[s]);
-    const std::int64_t ld = (rows + 2 * kPadding - 1) / kPadding * kPadding;
+    const std::int64_t ld = (rows + kPadding - 1) / kPadding * kPadding;
     columns_.push_back({s, first, rows, ld, Aligned<T>(3 * ld, T(0))});
     joined_.push_back(0);
   }
@@ -99,7 +99,7 @@ void NodeColumns<T>::solve_sides(std::span<const Side> sides, typename Supernoda
   factor_.forward_sides_along(path, work);
   for (std::size_t r = 0; r < sides.size(); ++r) {
     Column& column = columns_[sides[r].column];
-    T* to = column.values.data() + sides[r].axis * column.ld;
+    T* to = column.begin() + sides[r].axis * column.ld;
     for_each_range(column, [&](std::int64_t first, std::int64_t place, std::int64_t rows) {
       std::copy_n(y + first + r * work.ld, rows, to + place);
     });
@@ -163,12 +163,11 @@ void NodeColumns<T>::make_gram(std::span<const std::int32_t> few, std::int32_t j
   double g[9 * kColumnsPerTask];
   for (std::size_t k = 0; k < few.size(); ++k) {
     const Column& column = columns_[few[k]];
-    from[k] = column.values.data() + column.rows - rows;
+    from[k] = column.end();
     from_ld[k] = column.ld;
   }
   const Column& to = columns_[j];
-  factor_.kernels().gram3(from.data(), from_ld.data(), static_cast<int>(few.size()), to.values.data() + to.rows - rows,
-                          to.ld, rows, g);
+  factor_.kernels().gram3(from.data(), from_ld.data(), static_cast<int>(few.size()), to.end(), to.ld, rows, g);
   const std::int64_t ld = gram_length(), at_j = 3 * std::int64_t{j};
   for (std::size_t k = 0; k < few.size(); ++k) {
     const std::int64_t at_i = 3 * std::int64_t{few[k]};
@@ -229,7 +228,7 @@ void NodeColumns<T>::dots(std::span<const std::int32_t> columns, const T* y, dou
     const Column& column = columns_[columns[k]];
     std::fill_n(t + 3 * k, 3, 0.0);
     for_each_range(column, [&](std::int64_t first, std::int64_t place, std::int64_t rows) {
-      factor_.kernels().dots3(column.values.data() + place, column.ld, y + first, rows, t + 3 * k);
+      factor_.kernels().dots3(column.begin() + place, column.ld, y + first, rows, t + 3 * k);
     });
   }
 }
@@ -248,7 +247,7 @@ void NodeColumns<T>::subtract(std::span<const std::int32_t> columns, const doubl
       for_each_range(column, [&](std::int64_t first, std::int64_t place, std::int64_t rows) {
         const std::int64_t from = std::max(first, begin), to = std::min(first + rows, end);
         if (from < to)
-          factor_.kernels().subtract3(column.values.data() + place + from - first, column.ld, c + 3 * k, y + from,
+          factor_.kernels().subtract3(column.begin() + place + from - first, column.ld, c + 3 * k, y + from,
                                       to - from);
       });
     }

@@ -44,7 +44,11 @@ class NodeColumns {
   struct Column {
     std::int32_t supernode;
     std::int64_t first, rows, ld;  // first row; how many up to the root; entries from one column to the next
-    Aligned<T> values;             // (3, ld)
+    Aligned<T> values;             // (3, ld), the rows last: where two columns overlap, they are aligned alike
+    T* end() { return values.data() + ld; }
+    const T* end() const { return values.data() + ld; }
+    T* begin() { return end() - rows; }
+    const T* begin() const { return end() - rows; }
   };
   struct Side {  // one axis of a column
     std::int64_t row;
