@@ -6,6 +6,7 @@ namespace qlb {
 namespace {
 
 using Pairs = nb::ndarray<nb::numpy, const std::int32_t, nb::shape<-1, 2>>;
+using Stencils = nb::ndarray<nb::numpy, const std::int32_t, nb::shape<-1, 4>>;
 
 // A copy.
 nb::typed<nb::object, Pairs> pair_array(const std::vector<Pair>& pairs) {
@@ -71,6 +72,16 @@ void bind_candidates(nb::module_& m) {
           "minimum_distance",
           [](const Candidates& c, const Array<const double>& x) { return c.minimum_distance(nodal(c, x, "x")); },
           nb::arg("x"), ReleaseGil(), "Least distance [m] of the listed pairs at x; infinite if none is listed.")
+      .def(
+          "near",
+          [](const Candidates& c, const Array<const double>& x, double radius) -> nb::typed<nb::object, Stencils> {
+            const auto found = c.near(nodal(c, x, "x"), radius);
+            static const std::array<std::int32_t, 4> none{};
+            return nb::cast(Stencils(found.empty() ? none.data() : found[0].data(), {found.size(), 4}),
+                            nb::rv_policy::copy);
+          },
+          nb::arg("x"), nb::arg("radius"),
+          "Nodes of the listed pairs that are nearer than radius [m] at x (n, 3) [m], shape (k, 4), a copy.")
       .def(
           "intersections",
           [](Candidates& c, const Array<const double>& x) {

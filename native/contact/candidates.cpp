@@ -241,15 +241,24 @@ double Candidates::step_bound(const double* x, const double* p) {
   return least.first;
 }
 
+double Candidates::squared_distance(const double* x, std::int64_t pair) const {
+  const auto at = load_positions(x, pair_nodes(pair));
+  return (pair < vertex_face_count() ? closest_points<1>(at) : closest_points<2>(at)).distance2;
+}
+
 double Candidates::minimum_distance(const double* x) const {
-  const auto count = pairs(), faces = static_cast<std::int64_t>(vertex_faces_.size());
+  const auto count = pairs();
   double least = std::numeric_limits<double>::infinity();
 #pragma omp parallel for schedule(static) num_threads(threads_) reduction(min : least) if (count > kWorthThreads)
-  for (std::int64_t pair = 0; pair < count; ++pair) {
-    const auto at = load_positions(x, pair_nodes(pair));
-    least = std::min(least, (pair < faces ? closest_points<1>(at) : closest_points<2>(at)).distance2);
-  }
+  for (std::int64_t pair = 0; pair < count; ++pair) least = std::min(least, squared_distance(x, pair));
   return std::sqrt(least);
+}
+
+std::vector<std::array<std::int32_t, 4>> Candidates::near(const double* x, double radius) const {
+  std::vector<std::array<std::int32_t, 4>> found;
+  for (std::int64_t pair = 0; pair < pairs(); ++pair)
+    if (squared_distance(x, pair) < radius * radius) found.push_back(pair_nodes(pair));
+  return found;
 }
 
 }  // namespace qlb

@@ -38,6 +38,9 @@ class Candidates {
   // Least distance of the listed pairs at x; infinite if there are none.
   double minimum_distance(const double* x) const;
 
+  // Nodes of the listed pairs that are nearer than `radius` at x, of the first primitive, then of the second.
+  std::vector<std::array<std::int32_t, 4>> near(const double* x, double radius) const;
+
   // Edges that pass through or touch faces at x, of groups that may touch, without a common node: edge, face. Needs
   // and changes no list.
   std::vector<Pair> intersections(const double* x);
@@ -55,6 +58,7 @@ class Candidates {
   void find_pairs(const std::vector<Box>& boxes, bool within_groups, double radius);
   void check_finite(const double* values, const char* name) const;
   std::array<std::int32_t, 4> pair_nodes(std::int64_t pair) const;
+  double squared_distance(const double* x, std::int64_t pair) const;
   // Of pairs [begin, end), up to kPairs of one kind: a bit for each for which no planes were found that stay between
   // its primitives, the slack apart, all along x -> x + p.
   unsigned pairs_in_the_way(const double* x, const double* p, std::int64_t begin, std::int64_t end) const;

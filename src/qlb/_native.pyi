@@ -288,6 +288,11 @@ class Candidates:
         Least distance [m] of the listed pairs at x; infinite if none is listed.
         """
 
+    def near(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], radius: float) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 4), writable=False)]:
+        """
+        Nodes of the listed pairs that are nearer than radius [m] at x (n, 3) [m], shape (k, 4), a copy.
+        """
+
     def intersections(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int32], dict(shape=(None, 2), writable=False)]:
         """
         Edge and face of each pair that cross or touch at x, shape (k, 2). Changes no list of candidates.

@@ -13,6 +13,9 @@ from qlb.system.system import CholeskyKind, Precision
 REORDER = 0.02
 """Part of the nodes in contact from which on the order of elimination of the bodies alone is no longer good enough."""
 
+SOON = 3.0
+"""Times dhat: pairs nearer than that are counted in when the pattern is extended, so that it lasts."""
+
 
 class ContactMatrix:
     """Elastic Hessian plus that of contacts, and a Cholesky analysed for their common pattern.
@@ -45,7 +48,7 @@ class ContactMatrix:
             terms, (stencils, blocks) = contact.sliding_terms(), self._blocks(contact, x)
         nodes = np.concatenate([stencils, self._onto_free(terms.nodes)])
         if not self._holds(nodes).all():
-            self._extend(nodes)
+            self._extend(nodes, x)
         self._matrix.set_from(self._map, elastic)
         self._matrix.add_stencils(stencils, blocks)
         self._matrix.add_rank_one(terms, self._scripted)
@@ -82,10 +85,12 @@ class ContactMatrix:
         """Contacts that the pattern is extended for, shape (k, 4)."""
         return self._stencils
 
-    def _extend(self, nodes: IntArray) -> None:
-        """Analyse anew, for the contacts of now, and those of before while they are not many more."""
-        kept = self._stencils if len(self._stencils) < 2 * len(nodes) else self._stencils[:0]
-        self.analyse(np.unique(np.concatenate([kept, nodes]), axis=0))
+    def _extend(self, nodes: IntArray, x: FloatArray) -> None:
+        """Analyse anew, for the contacts of now and for pairs so near that they are likely to touch soon."""
+        model = self._system.contact
+        assert model is not None
+        soon = self._onto_free(model.candidates.near(x, SOON * model.dhat))
+        self.analyse(np.unique(np.concatenate([nodes, soon]), axis=0))
 
     def analyse(self, stencils: IntArray) -> None:
         """Extend the pattern of the bodies for `stencils` (k, 4), distinct and ascending."""
