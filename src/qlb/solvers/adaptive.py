@@ -13,7 +13,7 @@ from qlb.contact.stage import ContactPoint
 from qlb.errors import InputError
 from qlb.integrators.integrator import Stage, State
 from qlb.solvers.contact_base import SMALL, ContactBase
-from qlb.solvers.line_search import Point
+from qlb.solvers.line_search import LEARNT, Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
 from qlb.solvers.settings import Projection, SolverSettings, Tolerance
 from qlb.solvers.work import cost_of_factor, cost_of_terms
@@ -136,9 +136,9 @@ class QLA(FactoredLbfgs):
     ) -> tuple[_native.RankOneTerms, FloatArray]:
         """Terms of the Hessian of contact beside the factor, and their stiffness in pairs.
 
-        Pairs hold the change of friction themselves, since its terms are a bound. The factor is made anew where terms
-        are too many or their sum is not definite, and once more where double precision is still to be had; should that
-        not help, it has to do by itself.
+        Pairs hold half the change of friction themselves, since its terms are a bound. The factor is made anew where
+        terms are too many or their sum is not definite, and once more where double precision is still to be had; should
+        that not help, it has to do by itself.
         """
         given = problem.contact_terms(point.x, contact)
         terms, done = self._beside_factor(problem, contact, given, most=self.kappa)
@@ -153,7 +153,7 @@ class QLA(FactoredLbfgs):
             self._low_rank.set_terms(terms)
         known = np.zeros(terms.size)
         known[: given.size] = given.stiffness
-        known[contact.count : contact.count + 2 * len(contact.sliding_keys)] = 0.0
+        known[contact.count : contact.count + 2 * len(contact.sliding_keys)] *= 1 - LEARNT
         return terms, known
 
     def _beside_factor(

@@ -24,7 +24,7 @@ class LeadIn:
     """
 
     def __init__(self, problem: StageProblem, *, predict: bool) -> None:
-        """`predict`: whether to start from the predictor where nothing touches."""
+        """`predict`: whether to start from the predictor, or where something touches towards where inertia leads."""
         self._problem, self._predict = problem, predict
         self._x = problem.origin.positions
         self._move: FloatArray | None = None  # what the free nodes did in the last sub-step, for all of the script
@@ -64,6 +64,8 @@ class LeadIn:
         t, p = parts[best], moves[best]
         if t < 1:
             t *= SHARE
+        if not self._scripted and self._problem.system.is_inverted(x + t * p):
+            t, p = 1.0, self._still()
         if not self._scripted or t == 1:
             self._fraction = 1.0
         else:
@@ -98,19 +100,26 @@ class LeadIn:
         return len(history) > PATIENCE and history[-1] - history[-1 - PATIENCE] < LEAST_PROGRESS
 
     def _moves(self) -> list[FloatArray]:
-        """Ways to try: from where we are to where all that is scripted has arrived."""
+        """Ways to try: from where we are to where all that is scripted has arrived.
+
+        Where something touches, the predictor has forces of contact in it that will not be the same, and only a small
+        part of its way is free; of the way that inertia takes it is several times as much.
+        """
         problem, x = self._problem, self._x
-        still = problem.system.held.place(x, problem.stage.time) - x
         if self._move is not None:
             guess = x + (1 - self._fraction) * self._move
-        elif self._predict:
+        elif not self._predict:
+            return [self._still()]
+        elif self._scripted or not self._touches():
             guess = problem.predictor
         else:
-            return [still]
+            guess = problem.inertial if problem.stage.inertial else x
         moving = problem.system.held.place(guess, problem.stage.time) - x
-        if self._scripted:
-            return [moving, still]
-        return [still] if self._fraction == 0 and self._touches() else [moving]
+        return [moving, self._still()] if self._scripted else [moving]
+
+    def _still(self) -> FloatArray:
+        """The way on which only what is scripted moves."""
+        return self._problem.system.held.place(self._x, self._problem.stage.time) - self._x
 
     def _touches(self) -> bool:
         return self._contact.at(self._x).count > 0

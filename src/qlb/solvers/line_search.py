@@ -13,6 +13,7 @@ from qlb.system import StageProblem
 ARMIJO = 1e-4
 ROUNDING = 1e-11
 MAX_HALVINGS = 30
+LEARNT = 0.5  # of friction's stiffness, a bound, what pairs are to find out
 
 
 @dataclass(frozen=True)
@@ -29,9 +30,9 @@ class Point:
 
     @cached_property
     def secant(self) -> FloatArray:
-        """The gradient that pairs hold the change of where there is contact: without contact, but with friction."""
+        """The gradient that pairs hold the change of where there is contact: without it, but with half its friction."""
         sliding = None if self.contact is None else self.contact.sliding
-        return self.smooth if sliding is None else self.smooth + sliding
+        return self.smooth if sliding is None else self.smooth + LEARNT * sliding
 
     @property
     def is_finite(self) -> bool:

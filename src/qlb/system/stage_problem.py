@@ -205,12 +205,12 @@ class StageProblem:
         model = self.system.contact
         if not self.stage.inertial:
             return model.extent
-        way = max(float(np.abs(x - self.origin.positions).max()) for x in (self.start, self.predictor, self._inertial))
+        way = max(float(np.abs(x - self.origin.positions).max()) for x in (self.start, self.predictor, self.inertial))
         return min(model.extent, MOVE * way + 5 * model.dhat)
 
     @property
-    def _inertial(self) -> FloatArray:
-        """Where inertia alone leads [m], held nodes exact."""
+    def inertial(self) -> FloatArray:
+        """Where inertia alone leads [m], shape (n, 3), held nodes exact."""
         return self.system.held.place(self._target, self.stage.time)
 
     @cached_property
