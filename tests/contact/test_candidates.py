@@ -189,6 +189,19 @@ def test_least_distance(rng: np.random.Generator) -> None:
     assert any(soup.within(soup.x, d * (1 + 1e-9)))
 
 
+def test_listed_pairs_that_are_near(rng: np.random.Generator) -> None:
+    soup = random_soup(rng)
+    candidates = soup.candidates()
+    assert candidates.near(soup.x, 1.0).shape == (0, 4)
+    candidates.build(soup.x, 0 * soup.x, 0.0, 0.4)
+    faces, edges = soup.within(soup.x, 0.25)
+    expected = [(v, *soup.faces[f]) for v, f in faces]
+    expected += [(*soup.surface.edges[e], *soup.surface.edges[f]) for e, f in edges]
+    found = candidates.near(soup.x, 0.25)
+    assert sorted(map(tuple, found.tolist())) == sorted(tuple(int(n) for n in nodes) for nodes in expected)
+    assert 0 < len(found) < len(candidates.vertex_faces) + len(candidates.edge_edges)
+
+
 def test_bad_input_is_refused(rng: np.random.Generator) -> None:
     soup = random_soup(rng, groups=1)
     candidates, zero = soup.candidates(), 0 * soup.x

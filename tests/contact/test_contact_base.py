@@ -121,6 +121,16 @@ def test_what_differs_is_what_numpy_finds(softness, rng):
     np.testing.assert_allclose(found, wanted, atol=1e-9 * scale)
 
 
+def test_a_base_out_of_order_is_refused(rng):
+    simulation = resting()
+    now, then, _ = moved(simulation, rng)
+    base = ContactBase.of(then, np.ones(len(then.terms().stiffness), dtype=bool))
+    for name in ("keys", "sliding"):
+        broken = replace(base, **{name: getattr(base, name)[::-1].copy()})
+        with pytest.raises(ValueError, match="must be ascending"):
+            broken.difference(now, now.terms(), simulation.solver.inverse, 1.0)
+
+
 def test_a_saved_base_comes_back(rng):
     _, then, _ = moved(resting(), rng)
     base = ContactBase.of(then, np.ones(len(then.terms().stiffness), dtype=bool))

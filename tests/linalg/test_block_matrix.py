@@ -38,6 +38,30 @@ def test_pattern_refuses_a_node_that_is_not_there() -> None:
         _native.BlockPattern(4, np.array([[0, 1, 2, 4]], dtype=np.int32))
 
 
+def test_pattern_knows_which_stencils_it_holds(pattern: _native.BlockPattern, rng: np.random.Generator) -> None:
+    rows, columns = node_blocks(pattern)
+    there = np.zeros((pattern.nodes, pattern.nodes), dtype=bool)
+    there[rows, columns] = there[columns, rows] = True
+    stencils = rng.integers(pattern.nodes, size=(300, 4)).astype(np.int32)
+    stencils[:100, 2:] = stencils[:100, :1]  # some repeat a node, as those of planes do
+    stencils[100:150] = TetMesh.box(cells=(2, 2, 1)).tets[rng.integers(24, size=50)]
+    held = np.empty(len(stencils), dtype=np.uint8)
+    pattern.holds(stencils, held)
+    expected = there[stencils[:, :, None], stencils[:, None, :]].all(axis=(1, 2))
+    np.testing.assert_array_equal(held != 0, expected)
+    assert 50 < expected.sum() < 250
+
+
+def test_pattern_refuses_stencils_that_make_no_sense(pattern: _native.BlockPattern) -> None:
+    held = np.empty(1, dtype=np.uint8)
+    with pytest.raises(ValueError, match=r"node index -1 is outside \[0, 18\)"):
+        pattern.holds(np.array([[0, 1, 2, -1]], dtype=np.int32), held)
+    with pytest.raises(ValueError, match="out has 1 entries"):
+        pattern.holds(np.zeros((2, 4), dtype=np.int32), held)
+    with pytest.raises(ValueError, match="four entries"):
+        pattern.holds(np.zeros((1, 3), dtype=np.int32), held)
+
+
 def test_product_is_that_of_the_dense_matrix(pattern: _native.BlockPattern, rng: np.random.Generator) -> None:
     matrix = _native.BlockMatrix(pattern)
     blocks = rng.normal(size=matrix.values.shape)

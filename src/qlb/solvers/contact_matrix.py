@@ -74,7 +74,7 @@ class ContactMatrix:
         """Which of the stencils (k, 4) the pattern has all blocks of."""
         found = np.empty(len(nodes), dtype=np.uint8)
         self._pattern.holds(nodes, found)
-        return found != 0
+        return np.asarray(found != 0)
 
     def fits(self, nodes: IntArray) -> BoolArray:
         """Which of the stencils (k, 4) need no extension."""

@@ -43,7 +43,7 @@ class SolverSettings(Settings):
     initial_guess: InitialGuess | None = Field(
         None,
         description="Where a solve starts: previous, that is x_k (default of ND, QLF, QLB), or the predictor from"
-        " velocity and acceleration (default of QLA)",
+        " velocity and acceleration (default of QLA), in contact the free part of the way that inertia takes",
     )
     max_iterations: int | None = quantity(
         None, "Nonlinear iterations of one solve before it counts as failed: 500, in QLA 5000", ge=1

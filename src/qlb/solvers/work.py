@@ -11,8 +11,8 @@ PER_SOLVE_ENTRY = {"compact": 0.4, "float32": 0.7, "float64": 1.2}
 PER_HESSIAN_TET = 110.0
 PER_GRADIENT_TET = 25.0
 PER_ITERATION = 1e5
-PER_TERM = 1.5e4
-PER_TERM_CUBED = 0.035
+PER_TERM = 4e3
+PER_TERM_CUBED = 0.01
 
 
 def cost_of_factor(cholesky: _native.Cholesky, precision: str, tets: int) -> float:
