@@ -70,9 +70,10 @@ void bind_assembly(nb::module_& m) {
       .def(
           "add_rank_one",
           [](BlockMatrix& a, const RankOneTerms& terms, const Array<const std::uint8_t>& left_out) {
-            const auto count = static_cast<std::size_t>(4 * terms.size());
             sized(left_out, a.pattern().nodes(), "left_out");
-            a.add_rank_one({terms.all_nodes().data()->data(), count}, terms.all_vectors().data()->data(),
+            if (terms.size() == 0) return;
+            const auto count = static_cast<std::size_t>(4 * terms.size());
+            a.add_rank_one({terms.all_nodes()[0].data(), count}, terms.all_vectors()[0].data(),
                            terms.all_stiffness().data(), view(left_out));
           },
           nb::arg("terms"), nb::arg("left_out"), ReleaseGil(),
