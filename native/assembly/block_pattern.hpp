@@ -21,8 +21,8 @@ class BlockPattern {
   // Index of block (i, j) or (j, i), whichever is in the lower triangle; throws std::out_of_range if it is
   // not there.
   std::int64_t find(std::int32_t i, std::int32_t j) const;
-  // For each of the stencils (count, 4), whether all blocks between its nodes are there. Throws std::invalid_argument on
-  // a node outside [0, nodes).
+  // For each of the stencils (count, 4), whether all blocks between its nodes are there. Throws std::invalid_argument
+  // on a node outside [0, nodes).
   void holds(std::span<const std::int32_t> stencils, std::uint8_t* held) const;
 
  private:

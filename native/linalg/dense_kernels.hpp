@@ -80,9 +80,9 @@ struct DenseKernels {
                 double* g);
   void (*dots3)(const T* a, std::int64_t lda, const T* y, std::int64_t rows, double* t);
   void (*subtract3)(const T* a, std::int64_t lda, const double* c, T* y, std::int64_t rows);
-  // G u for `count` (<= kTermBlock) terms u, G (length, length) with rows `ld` apart: out (length, kTermBlock), the terms
-  // side by side, and what stands in `work` (kTermBlock, length) for those that lack; length a multiple of kPadding.
-  // Then u^T of another term with all of them, kTermBlock sums.
+  // G u for `count` (<= kTermBlock) terms u, G (length, length) with rows `ld` apart: out (length, kTermBlock), the
+  // terms side by side, and what stands in `work` (kTermBlock, length) for those that lack; length a multiple of
+  // kPadding. Then u^T of another term with all of them, kTermBlock sums.
   void (*multiply_terms)(const NodeTerm* const* terms, int count, const T* matrix, std::int64_t ld, std::int64_t length,
                          T* work, T* out);
   void (*dot_terms)(const NodeTerm& term, const T* products, double* sums);

@@ -105,8 +105,7 @@ void dot_terms(const NodeTerm& term, const T* products, double* sums) {
       const T* from = products + kTermBlock * (3 * std::int64_t{term.column[k]} + c);
       const D weight(term.u[k][c]);
 #pragma GCC unroll 8
-      for (int v = 0; v < vectors; ++v)
-        sum[v] = xsimd::fma(weight, load_doubles<D>(from + v * kLanes<D>), sum[v]);
+      for (int v = 0; v < vectors; ++v) sum[v] = xsimd::fma(weight, load_doubles<D>(from + v * kLanes<D>), sum[v]);
     }
 #pragma GCC unroll 8
   for (int v = 0; v < vectors; ++v) sum[v].store_unaligned(sums + v * kLanes<D>);

@@ -192,10 +192,9 @@ template <class T>
 void NodeColumns<T>::join(std::span<const std::int32_t> columns) {
   reserve_gram();
   std::vector<std::int32_t> ids(columns.begin(), columns.end());
-  std::sort(ids.begin(), ids.end(),
-            [&](std::int32_t a, std::int32_t b) {
-              return std::tuple(!joined_[a], first_row(a)) < std::tuple(!joined_[b], first_row(b));
-            });
+  std::sort(ids.begin(), ids.end(), [&](std::int32_t a, std::int32_t b) {
+    return std::tuple(!joined_[a], first_row(a)) < std::tuple(!joined_[b], first_row(b));
+  });
   const auto count = static_cast<std::int64_t>(ids.size());
   const std::int64_t known =
       std::find_if(ids.begin(), ids.end(), [&](std::int32_t k) { return !joined_[k]; }) - ids.begin();
@@ -247,8 +246,7 @@ void NodeColumns<T>::subtract(std::span<const std::int32_t> columns, const doubl
       for_each_range(column, [&](std::int64_t first, std::int64_t place, std::int64_t rows) {
         const std::int64_t from = std::max(first, begin), to = std::min(first + rows, end);
         if (from < to)
-          factor_.kernels().subtract3(column.begin() + place + from - first, column.ld, c + 3 * k, y + from,
-                                      to - from);
+          factor_.kernels().subtract3(column.begin() + place + from - first, column.ld, c + 3 * k, y + from, to - from);
       });
     }
   }

@@ -31,8 +31,8 @@ class NodeColumns {
   std::int64_t first_row(std::int32_t column) const { return columns_[column].first; }
   std::int64_t count() const { return static_cast<std::int64_t>(columns_.size()); }
   std::int64_t bytes() const;
-  // G u for up to kTermBlock terms whose columns were joined, as DenseKernels::multiply_terms; `work` and `out` have room
-  // for kTermBlock gram_length(). What stands there for columns that were not joined does not matter.
+  // G u for up to kTermBlock terms whose columns were joined, as DenseKernels::multiply_terms; `work` and `out` have
+  // room for kTermBlock gram_length(). What stands there for columns that were not joined does not matter.
   void gram_products(std::span<const NodeTerm* const> terms, T* work, T* out) const;
   std::int64_t gram_length() const { return 3 * capacity_; }
   const DenseKernels<T>& kernels() const { return factor_.kernels(); }
@@ -67,9 +67,7 @@ class NodeColumns {
   void make_gram(std::span<const std::int32_t> few, std::int32_t j, std::int64_t rows);
   void reserve_gram();
   // Row d of the blocks G_ij, j = 0, 1, ...
-  const T* gram_row(std::int32_t i, int d) const {
-    return gram_.data() + (3 * std::int64_t{i} + d) * gram_length();
-  }
+  const T* gram_row(std::int32_t i, int d) const { return gram_.data() + (3 * std::int64_t{i} + d) * gram_length(); }
 
   const Supernodes& supernodes_;
   const SupernodalFactor<T>& factor_;
