@@ -103,7 +103,7 @@ class LeadIn:
         """Ways to try: from where we are to where all that is scripted has arrived.
 
         Where something touches, the predictor has forces of contact in it that will not be the same, and only a small
-        part of its way is free; of the way that inertia takes it is several times as much.
+        part of its way is free; of the way that inertia takes it is about twice as much.
         """
         problem, x = self._problem, self._x
         if self._move is not None:
