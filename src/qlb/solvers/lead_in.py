@@ -102,8 +102,8 @@ class LeadIn:
     def _moves(self) -> list[FloatArray]:
         """Ways to try: from where we are to where all that is scripted has arrived.
 
-        Where something touches, the predictor has forces of contact in it that will not be the same, and less of its way
-        is free than of the way that inertia takes: in the second stage of SDIRK2 about half as much.
+        Where something touches, the predictor has forces of contact in it that will not be the same. Less of its way is
+        free than of the way that inertia takes: in the second stage of SDIRK2 about half as much.
         """
         problem, x = self._problem, self._x
         if self._move is not None:
