@@ -97,6 +97,15 @@ void bind_energies(nb::module_& m) {
           },
           nb::arg("x"), nb::arg("scale"), nb::arg("gradient").noconvert(), ReleaseGil())
       .def(
+          "add_viscous_value_gradient",
+          [](ElasticEnergy& e, const Array<const double>& x, const ElasticEnergy& viscosity, double scale,
+             const Array<double>& gradient) {
+            return e.add_value_gradient(sized(x, 3 * e.nodes(), "x"), viscosity, scale,
+                                        sized(gradient, 3 * e.nodes(), "gradient"));
+          },
+          nb::arg("x"), nb::arg("viscosity"), nb::arg("scale"), nb::arg("gradient").noconvert(), ReleaseGil(),
+          "add_value_gradient of the sum of this and the viscosity of the same elements, in one loop over them.")
+      .def(
           "add_hessian",
           [](ElasticEnergy& e, const Array<const double>& x, double scale, bool project, BlockMatrix& matrix) {
             e.add_hessian(sized(x, 3 * e.nodes(), "x"), scale, project, matrix);

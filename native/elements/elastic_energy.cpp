@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 
 #include "elements/dispatch.hpp"
 #include "elements/slot_sums.hpp"
@@ -62,6 +64,22 @@ double ElasticEnergy::add_value_gradient(const double* x, double scale, double* 
   for_each_chunk([&](std::int64_t k, const Chunk& chunk, const ChunkData& data, double* scratch) {
     chunk_energy_[k] = kernels_->value_gradient(data, x, scratch, slot_gradient_.data() + kStride * chunk.first_slot);
   });
+  return sum_chunks(scale, gradient);
+}
+
+double ElasticEnergy::add_value_gradient(const double* x, const ElasticEnergy& viscosity, double scale,
+                                         double* gradient) {
+  if (viscosity.blocks_ != blocks_) throw std::invalid_argument("viscosity: of other elements");
+  if (std::string_view(viscosity.kernels_->name) != "viscous")
+    throw std::invalid_argument("viscosity: of material '" + std::string(viscosity.kernels_->name) + "'");
+  for_each_chunk([&](std::int64_t k, const Chunk& chunk, const ChunkData& data, double* scratch) {
+    chunk_energy_[k] = kernels_->viscous_value_gradient(data, viscosity.chunk_data(chunk).parameters, x, scratch,
+                                                        slot_gradient_.data() + kStride * chunk.first_slot);
+  });
+  return sum_chunks(scale, gradient);
+}
+
+double ElasticEnergy::sum_chunks(double scale, double* gradient) {
   add_slots<3, kStride>(blocks_->node_slots, slot_gradient_.data(), scale, gradient, threads_);
   return scale * std::accumulate(chunk_energy_.begin(), chunk_energy_.end(), 0.0);
 }

@@ -22,6 +22,8 @@ class ElasticEnergy {
   double value(const double* x);  // [J]
   // gradient += scale dPsi/dx; returns scale Psi.
   double add_value_gradient(const double* x, double scale, double* gradient);
+  // The same of the sum of this and of `viscosity`, the energy of material Viscous over the same elements, in one loop.
+  double add_value_gradient(const double* x, const ElasticEnergy& viscosity, double scale, double* gradient);
   void add_hessian(const double* x, double scale, bool project, BlockMatrix& matrix);
 
   std::int64_t nodes() const { return blocks_->nodes; }
@@ -35,6 +37,7 @@ class ElasticEnergy {
   // kernel(chunk, data, scratch) over all chunks in parallel.
   template <class Kernel>
   void for_each_chunk(const Kernel& kernel);
+  double sum_chunks(double scale, double* gradient);  // of what a kernel has left
 
   std::shared_ptr<const TetBlocks> blocks_;
   const MaterialKernels* kernels_;

@@ -6,6 +6,7 @@
 #include "elements/kernels.hpp"
 #include "elements/lanes.hpp"
 #include "materials/material.hpp"
+#include "materials/viscous.hpp"
 #include "simd/svd3.hpp"
 
 namespace qlb {
@@ -17,14 +18,19 @@ struct Tets {
   V volume;
   const std::int64_t* vertex;  // vertex[a * kLanes + lane]
   const std::int32_t* pair;
+  std::int64_t pack;
+  int lane;
 
-  Tets(const ChunkData& chunk, std::int64_t pack, int lane) {
+  Tets(const ChunkData& chunk, std::int64_t pack, int lane) : pack(pack), lane(lane) {
     for (int k = 0; k < 9; ++k)
       Dm_inverse(k / 3, k % 3) = V::load_aligned(chunk.shape + (pack * 9 + k) * kLanes + lane);
     volume = V::load_aligned(chunk.volume + pack * kLanes + lane);
     vertex = chunk.vertex + pack * 4 * kLanes + lane;
     pair = chunk.pair + pack * kPairs * kLanes + lane;
   }
+
+  // Where these elements' entries start in a table (packs, count, kLanes) of the chunk.
+  const double* in_table(const double* table, std::int64_t count) const { return table + pack * count * kLanes + lane; }
 
   Mat3<V> deformation_gradient(const double* positions) const {
     const Vec3<V> x0 = Gather<V>::positions(positions, vertex);
@@ -64,10 +70,12 @@ std::int64_t parameter_count(const Program* program) {
 // visit(tets, material) for every vector of elements of the chunk, in order.
 template <class V, template <class> class M, class Visit>
 void for_each_tets(const ChunkData& chunk, const Visit& visit) {
-  const std::int64_t width = parameter_count<M<V>>(chunk.program) * kLanes;
+  const std::int64_t count = parameter_count<M<V>>(chunk.program);
   for (std::int64_t pack = 0; pack < chunk.packs; ++pack)
-    for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size))
-      visit(Tets<V>(chunk, pack, lane), load_material<M<V>, V>(chunk.parameters + pack * width + lane, chunk.program));
+    for (int lane = 0; lane < kLanes; lane += static_cast<int>(V::size)) {
+      const Tets<V> tets(chunk, pack, lane);
+      visit(tets, load_material<M<V>, V>(tets.in_table(chunk.parameters, count), chunk.program));
+    }
 }
 
 // The chunk's own copy of its node positions, padded to 4 doubles a node.
@@ -90,25 +98,52 @@ double chunk_value(const ChunkData& chunk, const double* x, double* positions) {
   return xsimd::hadd(total);
 }
 
+// Adds dE/dx_a = volume P grad N_a at the vertices a.
+template <class V>
+void scatter_stress(const Tets<V>& tets, const Mat3<V>& P, double* slot_gradient) {
+  Vec3<V> force[4];
+  for (int i = 0; i < 3; ++i) force[0][i] = V(0.0);
+  for (int a = 1; a < 4; ++a) {
+    const Vec3<V> b = tets.shape_gradient(a);
+    for (int i = 0; i < 3; ++i) {
+      force[a][i] = tets.volume * (P(i, 0) * b[0] + P(i, 1) * b[1] + P(i, 2) * b[2]);
+      force[0][i] -= force[a][i];
+    }
+  }
+  for (int a = 0; a < 4; ++a) Scatter<V>::add_vector(force[a], tets.vertex + a * kLanes, slot_gradient);
+}
+
 template <class V, template <class> class M>
 double chunk_value_gradient(const ChunkData& chunk, const double* x, double* positions, double* slot_gradient) {
   load_positions(chunk, x, positions);
   set_zero(slot_gradient, kStride * chunk.slots);
   V total(0.0);
   for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
-    const Mat3<V> F = tets.deformation_gradient(positions);
     Mat3<V> P;
-    total += tets.volume * material.energy_stress(F, P);
-    Vec3<V> force[4];  // dE/dx_a = volume P grad N_a
-    for (int i = 0; i < 3; ++i) force[0][i] = V(0.0);
-    for (int a = 1; a < 4; ++a) {
-      const Vec3<V> b = tets.shape_gradient(a);
-      for (int i = 0; i < 3; ++i) {
-        force[a][i] = tets.volume * (P(i, 0) * b[0] + P(i, 1) * b[1] + P(i, 2) * b[2]);
-        force[0][i] -= force[a][i];
-      }
-    }
-    for (int a = 0; a < 4; ++a) Scatter<V>::add_vector(force[a], tets.vertex + a * kLanes, slot_gradient);
+    total += tets.volume * material.energy_stress(tets.deformation_gradient(positions), P);
+    scatter_stress(tets, P, slot_gradient);
+  });
+  return xsimd::hadd(total);
+}
+
+// The same of the material and of its viscosity together: they share what costs most, F and the sum at the vertices.
+template <class V, template <class> class M>
+double chunk_viscous_value_gradient(const ChunkData& chunk, const double* viscosity, const double* x, double* positions,
+                                    double* slot_gradient) {
+  load_positions(chunk, x, positions);
+  set_zero(slot_gradient, kStride * chunk.slots);
+  V total(0.0);
+  for_each_tets<V, M>(chunk, [&](const Tets<V>& tets, const M<V>& material) {
+    const double* parameters = tets.in_table(viscosity, Viscous<V>::parameter_count);
+    const auto viscous = load_material<Viscous<V>, V>(parameters, nullptr);
+    const Mat3<V> F = tets.deformation_gradient(positions);
+    Mat3<V> P, more;
+    V energy = material.energy_stress(F, P);
+    energy += viscous.energy_stress(F, more);
+    total += tets.volume * energy;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) P(i, j) += more(i, j);
+    scatter_stress(tets, P, slot_gradient);
   });
   return xsimd::hadd(total);
 }
@@ -279,7 +314,13 @@ template <class V, template <class> class M>
 MaterialKernels make_kernels() {
   int count = kAsProgram;
   if constexpr (!takes_program<M<V>>) count = M<V>::parameter_count;
-  return {M<V>::name, count, chunk_value<V, M>, chunk_value_gradient<V, M>, chunk_hessian<V, M>, lanes_density<V, M>};
+  return {M<V>::name,
+          count,
+          chunk_value<V, M>,
+          chunk_value_gradient<V, M>,
+          chunk_viscous_value_gradient<V, M>,
+          chunk_hessian<V, M>,
+          lanes_density<V, M>};
 }
 
 }  // namespace qlb

@@ -31,6 +31,9 @@ struct MaterialKernels {
   double (*value)(const ChunkData&, const double* x, double* scratch);
   // slot_gradient: (slots, kStride), aligned to 32 bytes, overwritten
   double (*value_gradient)(const ChunkData&, const double* x, double* scratch, double* slot_gradient);
+  // of the material and, with the parameters of Viscous, of viscosity
+  double (*viscous_value_gradient)(const ChunkData&, const double* viscosity, const double* x, double* scratch,
+                                   double* slot_gradient);
   // slot_blocks: (block_slots, 3, 3), overwritten
   void (*hessian)(const ChunkData&, const double* x, bool project, double* scratch, double* slot_blocks);
   // The density itself at kLanes deformation gradients: F (9, kLanes), parameters (count, kLanes) ->

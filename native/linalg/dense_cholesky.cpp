@@ -6,19 +6,22 @@
 
 namespace qlb {
 
-DenseCholesky::DenseCholesky(const std::string& simd) : kernels_(find_dense_kernels<double>(simd)) {}
+template <class T>
+DenseCholesky<T>::DenseCholesky(const std::string& simd) : kernels_(find_dense_kernels<T>(simd)) {}
 
-void DenseCholesky::resize(std::int64_t size, std::int64_t positive) {
+template <class T>
+void DenseCholesky<T>::resize(std::int64_t size, std::int64_t positive) {
   size_ = size, positive_ = positive;
   ld_ = (size + 7) / 8 * 8 + 8;  // seldom a power of two, which the cache would not like
   matrix_.resize(ld_ * size + kPadding + ld_);
   side_.resize(size + kPadding);
   work_.resize(kWorkEntries);
-  std::fill(matrix_.begin(), matrix_.end(), 0.0);
+  std::fill(matrix_.begin(), matrix_.end(), T(0));
 }
 
+template <class T>
 template <class F>
-void DenseCholesky::for_each_panel(const F& f) const {
+void DenseCholesky<T>::for_each_panel(const F& f) const {
   for (std::int64_t j = 0; j < size_;) {
     const std::int64_t end = std::min(j + kWide, j < positive_ ? positive_ : size_);
     f(j, end);
@@ -27,18 +30,20 @@ void DenseCholesky::for_each_panel(const F& f) const {
 }
 
 // Columns [j, j + width) minus L of columns [first, first + depth) times b^T, b the rows from j on of those columns.
-void DenseCholesky::subtract_product(std::int64_t j, std::int64_t width, const double* b, std::int64_t first,
-                                     std::int64_t depth) {
+template <class T>
+void DenseCholesky<T>::subtract_product(std::int64_t j, std::int64_t width, const T* b, std::int64_t first,
+                                        std::int64_t depth) {
   if (depth == 0) return;
-  double* block = column(j) + j;
-  const double* from = column(first) + j;
+  T* block = column(j) + j;
+  const T* from = column(first) + j;
   for (std::int64_t i = 0; i < size_ - j; i += kTask)
     kernels_.subtract(block + i, ld_, from + i, b, ld_, std::min<std::int64_t>(kTask, size_ - j - i), width, depth,
                       i == 0, false, work_.data());
 }
 
 // Of the columns of -1 the factor L22 is that of -S22 + L21 L21^T.
-void DenseCholesky::subtract_left(std::int64_t j, std::int64_t width) {
+template <class T>
+void DenseCholesky<T>::subtract_left(std::int64_t j, std::int64_t width) {
   if (j < positive_) return subtract_product(j, width, column(0) + j, 0, j);
   negated_.resize(ld_ * positive_ + kPadding + ld_);
   for (std::int64_t k = 0; k < positive_; ++k)
@@ -47,7 +52,8 @@ void DenseCholesky::subtract_left(std::int64_t j, std::int64_t width) {
   subtract_product(j, width, column(positive_) + j, positive_, j - positive_);
 }
 
-bool DenseCholesky::factorise() {
+template <class T>
+bool DenseCholesky<T>::factorise() {
   for (std::int64_t j = positive_; j < size_; ++j)
     for (std::int64_t i = j; i < size_; ++i) column(j)[i] = -column(j)[i];
   bool good = true;
@@ -62,11 +68,12 @@ bool DenseCholesky::factorise() {
   return good;
 }
 
-void DenseCholesky::solve(double* b) {
-  double* x = side_.data();
+template <class T>
+void DenseCholesky<T>::solve(double* b) {
+  T* x = side_.data();
   const std::int64_t n = size_, ldx = n + kPadding;
-  std::copy_n(b, n, x);
-  std::fill_n(x + n, kPadding, 0.0);
+  std::transform(b, b + n, x, [](double value) { return static_cast<T>(value); });
+  std::fill_n(x + n, kPadding, T(0));
   std::vector<std::pair<std::int64_t, std::int64_t>> panels;
   for_each_panel([&](std::int64_t j, std::int64_t end) { panels.emplace_back(j, end); });
   for (const auto& [j, end] : panels) {
@@ -81,5 +88,8 @@ void DenseCholesky::solve(double* b) {
   }
   std::copy_n(x, n, b);
 }
+
+template class DenseCholesky<float>;
+template class DenseCholesky<double>;
 
 }  // namespace qlb

@@ -132,10 +132,17 @@ bool WoodburyInverse::express(NodeColumns<T>& columns) {
 
   const auto negative =
       std::stable_partition(active_.begin(), active_.end(), [](const Active& a) { return a.positive; });
-  small_.resize(active_terms(), negative - active_.begin());
+  positive_ = negative - active_.begin();
   columns.join(used_);
-  form_small_matrix(columns);
-  return small_.factorise();
+  in_double_ = std::is_same_v<T, double> || !factorise_small_matrix(columns, small_float_);
+  return !in_double_ || factorise_small_matrix(columns, small_double_);
+}
+
+template <class T, class S>
+bool WoodburyInverse::factorise_small_matrix(const NodeColumns<T>& columns, DenseCholesky<S>& small) {
+  small.resize(active_terms(), positive_);
+  form_small_matrix(columns, small);
+  return small.factorise();
 }
 
 template <class T>
@@ -166,8 +173,8 @@ auto WoodburyInverse::in_frame(const NodeColumns<T>& columns, std::int64_t j) co
 
 // S_jl = sign_j delta_jl + sum over the nodes a of j and b of l of u_ja^T G_ab u_lb: for a block of rows j first all of
 // G u_j.
-template <class T>
-void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
+template <class T, class S>
+void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns, DenseCholesky<S>& small) const {
   const std::int64_t count = active_terms();
 #pragma omp parallel num_threads(threads_) if (threads_ > 1 && count > 2 * kTermBlock)
   {
@@ -182,9 +189,10 @@ void WoodburyInverse::form_small_matrix(const NodeColumns<T>& columns) {
       for (std::int64_t l = 0; l < end; ++l) {
         columns.kernels().dot_terms(active_[l], products.data(), sums);
         const std::int64_t from = std::max(first, l);
-        std::copy(sums + (from - first), sums + (end - first), small_.column(l) + from);
+        std::transform(sums + (from - first), sums + (end - first), small.column(l) + from,
+                       [](double sum) { return static_cast<S>(sum); });
       }
-      for (std::int64_t j = first; j < end; ++j) small_.column(j)[j] += active_[j].positive ? 1.0 : -1.0;
+      for (std::int64_t j = first; j < end; ++j) small.column(j)[j] += active_[j].positive ? S(1) : S(-1);
     }
   }
 }
@@ -204,7 +212,10 @@ void WoodburyInverse::correct(NodeColumns<T>& columns, const double* beta, T* y,
     if (beta != nullptr) sum -= (term.positive ? 1.0 : -1.0) / term.root * beta[term.term];
     term_products_[j] = sum;
   }
-  small_.solve(term_products_.data());
+  if (in_double_)
+    small_double_.solve(term_products_.data());
+  else
+    small_float_.solve(term_products_.data());
   std::fill(node_products_.begin(), node_products_.end(), 0.0);
   for (std::size_t j = 0; j < active_.size(); ++j) {
     const Active& term = active_[j];

@@ -68,8 +68,10 @@ class WoodburyInverse : public InverseOperator {
   bool express(NodeColumns<T>& columns);
   template <class T>
   Active in_frame(const NodeColumns<T>& columns, std::int64_t term) const;
-  template <class T>
-  void form_small_matrix(const NodeColumns<T>& columns);
+  template <class T, class S>
+  bool factorise_small_matrix(const NodeColumns<T>& columns, DenseCholesky<S>& small);
+  template <class T, class S>
+  void form_small_matrix(const NodeColumns<T>& columns, DenseCholesky<S>& small) const;
   template <class T>
   void correct(NodeColumns<T>& columns, const double* beta, T* y, double scale);
   void solve(const double* b, const double* beta, double* x);
@@ -83,7 +85,11 @@ class WoodburyInverse : public InverseOperator {
   std::int64_t framed_ = 0;         // how many of the last terms are in the frame of the factor
   std::vector<Active> active_;      // the positive ones first
   std::vector<std::int32_t> used_;  // columns in use, in elimination order
-  DenseCholesky small_;
+  // S, as exact as the factor; where that is not enough to be definite, in double precision.
+  DenseCholesky<float> small_float_;
+  DenseCholesky<double> small_double_;
+  bool in_double_ = true;
+  std::int64_t positive_ = 0;  // active terms with k > 0
   std::vector<double> node_products_, term_products_, beta_;
   std::vector<std::int32_t> active_of_;  // of each term: its place in active_, or -1
   Aligned<double> right_, solution_, split_;

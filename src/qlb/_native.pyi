@@ -334,6 +334,11 @@ class ElasticEnergy:
 
     def add_value_gradient(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float: ...
 
+    def add_viscous_value_gradient(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], viscosity: ElasticEnergy, scale: float, gradient: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu')]) -> float:
+        """
+        add_value_gradient of the sum of this and the viscosity of the same elements, in one loop over them.
+        """
+
     def add_hessian(self, x: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], scale: float, project: bool, matrix: BlockMatrix) -> None: ...
 
 class Viscosity(ElasticEnergy):

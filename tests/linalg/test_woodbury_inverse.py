@@ -126,6 +126,15 @@ def test_equal_terms_count_twice(precision: str) -> None:
     assert_close(twice, dense_inverse(body), precision)
 
 
+def test_where_single_precision_is_too_coarse_for_equal_stiff_terms_double_is_taken(precision: str) -> None:
+    body = Body(precision)
+    terms = body.terms(4, 1e8)
+    assert body.inverse.set_terms(join(terms, terms, terms, terms).native)
+    many = dense_inverse(body)
+    assert body.inverse.set_terms(replace(terms, stiffness=4 * terms.stiffness).native)
+    assert_close(many, dense_inverse(body), precision)
+
+
 def test_terms_at_held_nodes_are_passed_over(precision: str, rng: np.random.Generator) -> None:
     body = Body(precision)
     held = np.flatnonzero(body.fixed.all(axis=1)).astype(np.int32)
@@ -236,8 +245,8 @@ def stencils(terms: Terms) -> Array:
     return terms.stiffness[:, None, None] * a[:, :, None] * a[:, None, :]
 
 
-def join(a: Terms, b: Terms) -> Terms:
-    return Terms(*(np.concatenate(parts) for parts in zip(vars(a).values(), vars(b).values(), strict=True)))
+def join(*some: Terms) -> Terms:
+    return Terms(*(np.concatenate(parts) for parts in zip(*(vars(terms).values() for terms in some), strict=True)))
 
 
 def test_product_with_terms_is_that_of_the_dense_matrix(rng: np.random.Generator) -> None:

@@ -62,6 +62,7 @@ class StageProblem:
         self._guess = self.predictor if guess is None else guess
         at_stage = {term: potential for term in system.terms if (potential := term.at(stage, self._guess)) is not None}
         self._terms = list(at_stage.values())
+        self._viscosity = next(filter(system.takes_along, self._terms), None)
         self._added = [at_stage[term] for term in system.added if term in at_stage]
         self.origin = origin or Origin(state.positions, state.time)
         self._last: tuple[FloatArray, float, FloatArray] | None = None
@@ -152,14 +153,21 @@ class StageProblem:
             return self._last[1:]
         system = self.system
         with self.timer.section("gradient"):
-            energy, stored = system.stored_energy(x, self.force_scale)
-            gradient = stored.copy()
+            energy, gradient = self._stored_energy(x)
             for potential in self._terms:
-                energy += potential.add_value_gradient(x, self.force_scale, gradient)
+                if potential is not self._viscosity:
+                    energy += potential.add_value_gradient(x, self.force_scale, gradient)
             if self.stage.inertial:
                 energy += system.inertia.add_value_gradient(x, self._target, self._mass_scale, gradient)
         self._last = x.copy(), energy, system.clear_held(gradient)
         return self._last[1:]
+
+    def _stored_energy(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """What the bodies store, and what viscosity adds where one loop does both, with the gradient of that."""
+        if self._viscosity is not None:
+            return self.system.viscous_energy(x, self._viscosity, self.force_scale)
+        energy, gradient = self.system.stored_energy(x, self.force_scale)
+        return energy, gradient.copy()
 
     def hessian(
         self, x: FloatArray, *, project: bool, matrix: _native.BlockMatrix | None = None

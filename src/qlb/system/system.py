@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypeGuard
 
 import numpy as np
 
@@ -173,6 +173,18 @@ class System:
     def planes(self) -> tuple[Plane, ...]:
         """The half-spaces, which have no nodes."""
         return self.assembly.planes
+
+    def takes_along(self, potential: Potential) -> TypeGuard[_native.Viscosity]:
+        """Whether `potential` is viscosity that the loop over the elements of all bodies can take along."""
+        return isinstance(potential, _native.Viscosity) and isinstance(self.elastic, _native.ElasticEnergy)
+
+    def viscous_energy(self, x: FloatArray, viscosity: _native.Viscosity, scale: float) -> tuple[float, FloatArray]:
+        """The sum of `potentials` and `viscosity` at positions `x` (n, 3) [m], and its gradient, both times `scale`."""
+        assert isinstance(self.elastic, _native.ElasticEnergy)
+        gradient = np.zeros(x.shape)
+        energy = self.elastic.add_viscous_value_gradient(x, viscosity, scale, gradient)
+        fibres = (part for part in self.potentials if part is not self.elastic)
+        return energy + sum(part.add_value_gradient(x, scale, gradient) for part in fibres), gradient
 
     def stored_energy(self, x: FloatArray, scale: float) -> tuple[float, FloatArray]:
         """The sum of `potentials` at positions `x` (n, 3) [m], and its gradient, both times `scale`; not to be changed.
