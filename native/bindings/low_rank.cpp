@@ -79,15 +79,17 @@ void bind_change(nb::module_& m) {
       "contact_change",
       [](const RankOneTerms& now, const KeyArray& keys, const KeyArray& sliding, const RankOneTerms& held,
          const KeyArray& held_keys, const KeyArray& held_sliding, const WoodburyInverse& inverse, double scale,
-         double small, double same, double shifted) {
+         double shifted, const std::vector<std::pair<double, double>>& levels, std::int64_t most) {
+        std::vector<Nearness> near;
+        for (const auto& [small, same] : levels) near.push_back({small, same});
         ContactChange change =
             contact_change({view(keys), view(sliding), now}, {view(held_keys), view(held_sliding), held}, inverse,
-                           {scale, small, same, shifted});
+                           {scale, shifted, near, most});
         return std::pair(std::make_shared<RankOneTerms>(std::move(change.terms)), change.framed);
       },
       nb::arg("now"), nb::arg("keys"), nb::arg("sliding"), nb::arg("held"), nb::arg("held_keys"),
-      nb::arg("held_sliding"), nb::arg("inverse"), nb::arg("scale"), nb::arg("small"), nb::arg("same"),
-      nb::arg("shifted"), ReleaseGil(),
+      nb::arg("held_sliding"), nb::arg("inverse"), nb::arg("scale"), nb::arg("shifted"), nb::arg("levels"),
+      nb::arg("most"), ReleaseGil(),
       "What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of "
       "friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor, "
       "ascending by them. "

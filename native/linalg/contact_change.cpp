@@ -67,33 +67,57 @@ double along(const std::array<double, 3>& axis, const Square<3>& A) {
   return sum;
 }
 
+// Stiffness along one direction, now and in the factor.
+struct Pair {
+  double now, then;
+
+  double change() const { return now - then; }
+  bool differs(const Nearness& near, double scale) const {
+    return std::abs(change()) > near.small * scale && !(now <= near.same * then && then <= near.same * now);
+  }
+};
+
 class Comparison {
  public:
-  Comparison(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse, const Nearness& near)
-      : now_(now), held_(held), inverse_(inverse), near_(near), small_(near.small * near.scale) {
-    lacking_ = now.terms.all_stiffness();
-    change_.resize(held.terms.size());
-    std::ranges::transform(held.terms.all_stiffness(), change_.begin(), std::negate<>());
+  Comparison(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse, const Comparing& by)
+      : now_(now), held_(held), inverse_(inverse), by_(by) {
+    for (const double stiffness : now.terms.all_stiffness()) lacking_.push_back({stiffness, 0.0});
+    for (const double stiffness : held.terms.all_stiffness()) kept_.push_back({0.0, stiffness});
   }
 
   ContactChange result() {
     for (const auto& [here, there] : in_common(now_.keys, held_.keys)) compare_normals(here, there);
     for (const auto& [here, there] : in_common(now_.sliding, held_.sliding))
       compare_sliding(now_.keys.size() + 2 * here, held_.keys.size() + 2 * there);
-    RankOneTerms terms;
-    terms.reserve(now_.terms.size() + std::ssize(change_) + turned_.size());
-    terms.add(now_.terms);
-    for (std::size_t j = 0; j < lacking_.size(); ++j) terms.set_stiffness(j, lacking_[j]);
-    for (std::size_t k = 0; k < change_.size(); ++k)
-      if (std::abs(change_[k]) > small_) terms.add(held_.terms.nodes(k), held_.terms.all_vectors()[k], change_[k]);
-    terms.add(turned_);
-    const std::int64_t framed = terms.size() - now_.terms.size();
-    return {std::move(terms), framed};
+    return beside(level());
   }
 
  private:
-  bool alike(double a, double b) const {
-    return (a <= near_.same * b && b <= near_.same * a) || (a <= small_ && b <= small_);
+  const Nearness& level() const {
+    const auto fits = [&](const Nearness& near) {
+      const auto differs = [&](const Pair& pair) { return pair.differs(near, by_.scale); };
+      return std::ranges::count_if(lacking_, differs) + std::ranges::count_if(kept_, differs) +
+                 std::ranges::count_if(turned_, differs) <=
+             by_.most;
+    };
+    const auto found = std::ranges::find_if(by_.levels, fits);
+    return found == by_.levels.end() ? by_.levels.back() : *found;
+  }
+
+  ContactChange beside(const Nearness& near) const {
+    RankOneTerms terms;
+    terms.reserve(now_.terms.size() + std::ssize(kept_) + std::ssize(turned_));
+    terms.add(now_.terms);
+    for (std::size_t j = 0; j < lacking_.size(); ++j)
+      terms.set_stiffness(j, lacking_[j].differs(near, by_.scale) ? lacking_[j].change() : 0.0);
+    for (std::size_t k = 0; k < kept_.size(); ++k)
+      if (kept_[k].differs(near, by_.scale))
+        terms.add(held_.terms.nodes(k), held_.terms.all_vectors()[k], kept_[k].change());
+    for (std::size_t k = 0; k < turned_.size(); ++k)
+      if (turned_[k].differs(near, by_.scale))
+        terms.add(held_.terms.nodes(axes_[k].of), axes_[k].weight, axes_[k].axis, turned_[k].change());
+    const std::int64_t framed = terms.size() - now_.terms.size();
+    return {std::move(terms), framed};
   }
 
   // Of now, in the frame of the factor.
@@ -111,9 +135,9 @@ class Comparison {
     const Vector a = pulled_back(here), &b = as_held(there);
     double turn = 0.0;
     for (int i = 0; i < 12; ++i) turn += (a[i] - b[i]) * (a[i] - b[i]);
-    if (!(std::max(now, then) * turn <= 0.5 * near_.scale)) return;
-    lacking_[here] = 0.0;
-    change_[there] = alike(now, then) ? 0.0 : now - then;
+    if (!(std::max(now, then) * turn <= 0.5 * by_.scale)) return;
+    lacking_[here] = {};
+    kept_[there].now = now;
   }
 
   // The two terms of friction turn with the slip; compared are the 3x3 blocks that they make at one node of a contact.
@@ -123,31 +147,34 @@ class Comparison {
     const Weights weight = weights(b[0], at), weight_now = weights(a[0], at);
     double shift = 0.0;
     for (int i = 0; i < 4; ++i) shift += (weight[i] - weight_now[i]) * (weight[i] - weight_now[i]);
-    if (!(shift <= near_.shifted)) return;
-    lacking_[here] = lacking_[here + 1] = change_[there] = change_[there + 1] = 0.0;
+    if (!(shift <= by_.shifted)) return;
+    lacking_[here] = lacking_[here + 1] = kept_[there] = kept_[there + 1] = {};
     const Square<3> now = block(a, &now_.terms.all_stiffness()[here], at);
     const Square<3> then = block(b, &held_.terms.all_stiffness()[there], at);
     Square<3> difference, axes;
     double most = 0.0;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) most = std::max(most, std::abs(difference[i][j] = now[i][j] - then[i][j]));
-    if (!(most > small_)) return;
+    if (!(most > by_.levels.front().small * by_.scale)) return;
     jacobi_eigen<3>(difference, axes);
-    for (int k = 0; k < 3; ++k)
-      if (std::abs(difference[k][k]) > small_ && !alike(along(axes[k], now), along(axes[k], then)))
-        add_turned(there, weight, axes[k], difference[k][k]);
+    for (int k = 0; k < 3; ++k) {
+      turned_.push_back({along(axes[k], now), along(axes[k], then)});
+      axes_.push_back({there, weight, axes[k]});
+    }
   }
 
-  void add_turned(std::int64_t there, const Weights& weight, const std::array<double, 3>& axis, double stiffness) {
-    turned_.add(held_.terms.nodes(there), weight, axis, stiffness);
-  }
+  struct Axis {
+    std::int64_t of;  // term that the factor holds
+    Weights weight;
+    std::array<double, 3> axis;
+  };
 
   const ContactTerms &now_, &held_;
   const WoodburyInverse& inverse_;
-  Nearness near_;
-  double small_;
-  std::vector<double> lacking_, change_;  // beside the factor: of the terms of now, of those that it holds
-  RankOneTerms turned_;                   // of friction, by eigenvectors
+  const Comparing& by_;
+  std::vector<Pair> lacking_, kept_;  // along the terms of now, and along those that the factor holds
+  std::vector<Pair> turned_;          // of friction, along eigenvectors
+  std::vector<Axis> axes_;            // these
 };
 
 void check(const ContactTerms& terms, const char* name) {
@@ -158,12 +185,13 @@ void check(const ContactTerms& terms, const char* name) {
 }  // namespace
 
 ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse,
-                             const Nearness& near) {
+                             const Comparing& by) {
+  if (by.levels.empty()) throw std::invalid_argument("levels: none");
   check(now, "now");
   check(held, "held");
   if (!std::ranges::is_sorted(held.keys) || !std::ranges::is_sorted(held.sliding))
     throw std::invalid_argument("held: keys and sliding must be ascending");
-  return Comparison(now, held, inverse, near).result();
+  return Comparison(now, held, inverse, by).result();
 }
 
 }  // namespace qlb

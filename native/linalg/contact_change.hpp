@@ -15,10 +15,18 @@ struct ContactTerms {
   const RankOneTerms& terms;
 };
 
-// What is near enough: stiffness within a factor `same`, or on both sides below `small`; normals that turn by less than
-// the stiffness of the bodies, `scale`, would see; friction whose weights of nodes have a squared change of `shifted`.
+// When stiffness is near enough: within a factor `same`, or different by no more than `small`, in parts of `scale`.
 struct Nearness {
-  double scale, small, same, shifted;
+  double small, same;
+};
+
+// Of `levels`, from fine to coarse, the first counts that leaves at most `most` terms, else the last. As the same count
+// normals that turn by less than the stiffness of the bodies, `scale`, would see, and friction whose weights of nodes
+// have a squared change of `shifted`.
+struct Comparing {
+  double scale, shifted;
+  std::span<const Nearness> levels;
+  std::int64_t most;
 };
 
 struct ContactChange {
@@ -28,6 +36,6 @@ struct ContactChange {
 
 // `held`: in the frame of the factor that `inverse` is over, its keys and sliding ascending.
 ContactChange contact_change(const ContactTerms& now, const ContactTerms& held, const WoodburyInverse& inverse,
-                             const Nearness& near);
+                             const Comparing& by);
 
 }  // namespace qlb

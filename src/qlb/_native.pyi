@@ -2,6 +2,7 @@
 Compiled kernels of qlb. Use the package `qlb`; this module has no stable interface.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Any, overload
 
 import numpy
@@ -512,7 +513,7 @@ class WoodburyInverse(InverseOperator):
     def bytes(self) -> int:
         """Memory of the half-solves and their products."""
 
-def contact_change(now: RankOneTerms, keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held: RankOneTerms, held_keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held_sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], inverse: WoodburyInverse, scale: float, small: float, same: float, shifted: float) -> tuple[RankOneTerms, int]:
+def contact_change(now: RankOneTerms, keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held: RankOneTerms, held_keys: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], held_sliding: Annotated[NDArray[numpy.int64], dict(order='C', device='cpu', writable=False)], inverse: WoodburyInverse, scale: float, shifted: float, levels: Sequence[tuple[float, float]], most: int) -> tuple[RankOneTerms, int]:
     """
     What a model needs beside a factor that holds other contacts. now, held: terms, k along normals, 2 f of friction, any others; keys (k), sliding (f): their pairs of primitives; `held` is in the frame of the factor, ascending by them. Gives the terms of now with the stiffness that goes beside the factor, after them others in the frame of the factor, and how many of these.
     """

@@ -7,7 +7,8 @@ import numpy as np
 from qlb import _native
 from qlb.arrays import BoolArray, IntArray
 from qlb.contact.stage import ContactPoint
-from qlb.solvers.contact_base import SAME, SHIFTED, SMALL, ContactBase
+from qlb.solvers import contact_base
+from qlb.solvers.contact_base import SHIFTED, ContactBase
 from tests.support import Array
 
 Terms = tuple[IntArray, Array, Array]
@@ -23,6 +24,21 @@ def reference_difference(
     base: ContactBase, contact: ContactPoint, inverse: _native.WoodburyInverse, scale: float
 ) -> tuple[Array, Terms]:
     """The stiffness of each term of `contact` beside the factor, and the terms in the frame of the factor."""
+    for near in contact_base.NEAR:
+        lacking, others = _at_level(base, contact, inverse, scale, near)
+        if np.count_nonzero(lacking) + len(others[2]) <= contact_base.CROWD:
+            break
+    return lacking, others
+
+
+def _at_level(
+    base: ContactBase,
+    contact: ContactPoint,
+    inverse: _native.WoodburyInverse,
+    scale: float,
+    near: tuple[float, float],
+) -> tuple[Array, Terms]:
+    small, same = near[0] * scale, near[1]
     terms, then_terms = arrays(contact.terms()), arrays(base.terms)
     lacking, change = terms[2].copy(), -then_terms[2]
     _, here, there = np.intersect1d(contact.contacts.key, base.keys, return_indices=True)
@@ -30,27 +46,27 @@ def reference_difference(
     turn = _pulled_back(inverse, terms[0][here], terms[1][here]) - then_terms[1][there]
     parallel = np.maximum(now, then) * np.sum(turn**2, axis=(1, 2)) <= 0.5 * scale
     lacking[here[parallel]] = 0.0
-    change[there[parallel]] = np.where(_alike(now, then, scale), 0.0, now - then)[parallel]
+    change[there[parallel]] = np.where(_alike(now, then, same), 0.0, now - then)[parallel]
 
     _, here, there = np.intersect1d(contact.sliding_keys, base.sliding, return_indices=True)
     rows = (contact.count + 2 * here)[:, None] + [0, 1]
     base_rows = (len(base.keys) + 2 * there)[:, None] + [0, 1]
-    nodes, old, held = (part[base_rows] for part in then_terms)
+    nodes, old, stiffness = (part[base_rows] for part in then_terms)
     new = _pulled_back(inverse, terms[0][rows], terms[1][rows])
     at = np.argmax(np.sum(old[:, 0] ** 2, axis=2), axis=1)
     weight = _weights(old[:, 0], at)
-    same = np.sum((weight - _weights(new[:, 0], at)) ** 2, axis=1) <= SHIFTED
-    lacking[rows[same]] = change[base_rows[same]] = 0.0
-    block, block_then = _block(new, terms[2][rows], at), _block(old, held, at)
-    k = np.flatnonzero(same & (np.abs(block - block_then).max(axis=(1, 2)) > SMALL * scale))
+    kept = np.sum((weight - _weights(new[:, 0], at)) ** 2, axis=1) <= SHIFTED
+    lacking[rows[kept]] = change[base_rows[kept]] = 0.0
+    block, block_then = _block(new, terms[2][rows], at), _block(old, stiffness, at)
+    k = np.flatnonzero(kept)
     sizes, axes = np.linalg.eigh(block[k] - block_then[k])
     side, side_then = (np.einsum("kia,kij,kja->ka", axes, b[k], axes) for b in (block, block_then))
-    c, a = np.nonzero(~_alike(side, side_then, scale) & (np.abs(sizes) > SMALL * scale))
+    c, a = np.nonzero(~_alike(side, side_then, same) & (np.abs(sizes) > small))
     vectors = weight[k[c], :, None] * axes[c, :, a][:, None, :]
 
-    change[np.abs(change) <= SMALL * scale] = 0.0
-    kept = np.flatnonzero(change)
-    others = then_terms[0][kept], then_terms[1][kept], change[kept]
+    lacking[lacking <= small] = change[np.abs(change) <= small] = 0.0
+    held = np.flatnonzero(change)
+    others = then_terms[0][held], then_terms[1][held], change[held]
     turned = nodes[k[c], 0], vectors, sizes[c, a]
     beside = [np.concatenate(parts) for parts in zip(others, turned, strict=True)]
     return lacking, (beside[0], beside[1], beside[2])
@@ -74,6 +90,5 @@ def _block(vectors: Array, stiffness: Array, at: IntArray) -> Array:
     return np.asarray(np.einsum("kt,kti,ktj->kij", stiffness, a, a))
 
 
-def _alike(now: Array, then: Array, scale: float) -> BoolArray:
-    near = (now <= SAME * then) & (then <= SAME * now)
-    return np.asarray(near | ((now <= SMALL * scale) & (then <= SMALL * scale)))
+def _alike(now: Array, then: Array, same: float) -> BoolArray:
+    return np.asarray((now <= same * then) & (then <= same * now))

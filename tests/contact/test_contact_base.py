@@ -74,8 +74,7 @@ def test_the_terms_are_those_of_the_contacts_and_then_two_for_each_that_slides(r
 
 @pytest.mark.parametrize("held", [1.0, 0.5])
 def test_what_the_factor_holds_and_what_goes_beside_it_is_the_hessian_of_now(held, monkeypatch, rng):
-    monkeypatch.setattr("qlb.solvers.contact_base.SAME", 1.0)
-    monkeypatch.setattr("qlb.solvers.contact_base.SMALL", 0.0)
+    monkeypatch.setattr("qlb.solvers.contact_base.NEAR", ((0.0, 1.0),))
     simulation = resting()
     now, then, x = moved(simulation, rng)
     assert 0 < now.count < then.count
@@ -102,9 +101,11 @@ def test_by_default_the_model_is_near_enough_along_every_direction(rng):
     assert np.count_nonzero(terms.stiffness) < len(then.terms().stiffness)
 
 
+@pytest.mark.parametrize("crowd", [600, 60, 45, 1])
 @pytest.mark.parametrize("softness", [1e-3, 0.05, 1.0])
-def test_what_differs_is_what_numpy_finds(softness, rng):
+def test_what_differs_is_what_numpy_finds(softness, crowd, rng, monkeypatch):
     """In a frame that has turned, by the dense sums of all terms beside the factor."""
+    monkeypatch.setattr("qlb.solvers.contact_base.CROWD", crowd)
     simulation = resting()
     now, then, x = moved(simulation, rng)
     base = ContactBase.of(then, rng.random(len(then.terms().stiffness)) < 0.8)
@@ -119,6 +120,25 @@ def test_what_differs_is_what_numpy_finds(softness, rng):
     others = terms.nodes[-framed:], terms.vectors[-framed:], terms.stiffness[-framed:]
     found, wanted = dense(others, len(x)), dense(change, len(x))
     np.testing.assert_allclose(found, wanted, atol=1e-9 * scale)
+
+
+def test_the_more_terms_there_are_the_coarser_is_what_counts_as_near(rng, monkeypatch):
+    simulation = resting()
+    now, then, _ = moved(simulation, rng)
+    base, inverse = ContactBase.of(then, np.ones(then.terms().size, dtype=bool)), simulation.solver.inverse
+    scale = 0.05 * then.terms().stiffness.max()
+
+    def terms_left(crowd: int) -> int:
+        monkeypatch.setattr("qlb.solvers.contact_base.CROWD", crowd)
+        return int(np.count_nonzero(base.difference(now, now.terms(), inverse, scale)[0].stiffness))
+
+    fine, coarse = terms_left(10**6), terms_left(0)
+    assert 0 < coarse < fine
+    assert terms_left(fine) == fine
+    assert coarse <= terms_left(fine - 1) < fine
+    monkeypatch.setattr("qlb.solvers.contact_base.NEAR", ())
+    with pytest.raises(ValueError, match="levels: none"):
+        terms_left(1)
 
 
 def test_a_base_out_of_order_is_refused(rng):

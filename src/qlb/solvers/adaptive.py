@@ -12,7 +12,7 @@ from qlb.arrays import FloatArray
 from qlb.contact.stage import ContactPoint
 from qlb.errors import InputError
 from qlb.integrators.integrator import Stage, State
-from qlb.solvers.contact_base import SMALL, ContactBase
+from qlb.solvers.contact_base import CROWD, NEAR, ContactBase
 from qlb.solvers.line_search import LEARNT, Point
 from qlb.solvers.quasi_newton import FactoredLbfgs
 from qlb.solvers.settings import Projection, SolverSettings, Tolerance
@@ -23,10 +23,9 @@ from qlb.timing import Timer
 MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
-CROWD = 600  # terms beside the factor from which on it takes them in
 COLUMN = 0.02  # cost of the half-solves of a node, in iterations
 RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
-OUTSIDE = 100  # terms that do not fit into its pattern, from which on it is extended for them
+OUTSIDE = 60  # terms that do not fit into its pattern, from which on it is extended for them
 
 
 class QLA(FactoredLbfgs):
@@ -37,9 +36,9 @@ class QLA(FactoredLbfgs):
     d det F = cof F : dF, and the closer to incompressible a material is, the more that matters.
 
     With contact the factor holds the contacts of then, too, as far as they fit into its pattern, in which those with
-    planes and obstacles always do. By what the contacts of the moment differ enters by Woodbury's formula, with
-    half-solves for their nodes that last as long as the factor, and pairs hold the change of the gradient without
-    contact, whose Hessian of the moment is known.
+    planes and obstacles always do. By what the contacts of the moment differ enters by Woodbury's formula, the smaller
+    differences only while they are few, with half-solves for their nodes that last as long as the factor, and pairs
+    hold the change of the gradient without contact, whose Hessian of the moment is known.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
     cost of a solve with this factor, or when the terms beside it have cost some times a new one; within a solve, when
@@ -303,7 +302,7 @@ class QLA(FactoredLbfgs):
         """What of the contacts of the moment goes into the factor that is about to be made."""
         terms = contact.terms()
         fits = self.factor.fits(terms.nodes)
-        if np.count_nonzero(terms.stiffness[~fits] > SMALL * scale) > OUTSIDE:
+        if np.count_nonzero(terms.stiffness[~fits] > NEAR[-1][0] * scale) > OUTSIDE:
             fits[:] = True
         self._base = ContactBase.of(contact, fits)
         return self._base.held

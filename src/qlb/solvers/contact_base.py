@@ -12,8 +12,11 @@ from qlb.contact.stage import ContactPoint
 
 PARTS = ("keys", "sliding", "nodes", "vectors", "stiffness")
 
-SAME = 2.0  # times stiffer or softer than in the factor is near enough
-SMALL = 0.1  # of the stiffness of the bodies: what is softer need not be right
+NEAR = ((0.03, 2.0), (0.05, 4.0), (0.1, 8.0))
+"""What is near enough in stiffness: a difference of this part of the stiffness of the bodies, or so many times more or
+less. From fine to coarse: the coarser, the fewer terms are left, and the more iterations a solve takes."""
+
+CROWD = 600  # terms that the finest of these may leave, or else the next
 SHIFTED = 0.03  # squared change of the weights of a contact's nodes, from which on it is another contact
 
 
@@ -67,7 +70,8 @@ class ContactBase:
         """What a model needs beside the factor.
 
         Along nearly the same normal only the change of stiffness counts; of friction, whose two terms turn with the
-        slip, the eigenvectors of the change of the 3x3 block that they make at one node.
+        slip, the eigenvectors of the change of the 3x3 block that they make at one node. Where they are a crowd, what
+        differs least is left to the pairs of L-BFGS.
 
         Args:
             contact: of the moment.
@@ -81,4 +85,4 @@ class ContactBase:
             the frame of the factor.
         """
         now, held = (terms, contact.contacts.key, contact.sliding_keys), (self.terms, self.keys, self.sliding)
-        return _native.contact_change(*now, *held, inverse, scale, SMALL, SAME, SHIFTED)
+        return _native.contact_change(*now, *held, inverse, scale, SHIFTED, NEAR, CROWD)
