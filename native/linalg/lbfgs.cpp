@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -60,12 +59,12 @@ void Lbfgs::join_terms(const RankOneTerms& terms) {
   change_.resize(count_ * count);
   for (int k = 0; k < count_; ++k) {
     with_terms_[k] = curvature_[slot(k)];
+    double *along = along_s_.data() + k * count, *change = change_.data() + k * count;
     for (std::int64_t j = 0; j < count; ++j) {
-      const double along = terms.dot(which_[j], s(k));
-      along_s_[k * count + j] = along;
-      change_[k * count + j] = known_[j] * along;
-      with_terms_[k] += known_[j] * along * along;
+      along[j] = terms.dot(which_[j], s(k));
+      change[j] = known_[j] * along[j];
     }
+    with_terms_[k] += dot(along, change, count, 1);
   }
 }
 
@@ -76,9 +75,9 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
   const auto count = static_cast<std::int64_t>(which_.size());
   forces_ = beta_;
   along_.resize(count);
-  const auto few_dot = [&](const double* a, const double* b) { return std::inner_product(a, a + count, b, 0.0); };
+  const auto few_dot = [&](const double* a, const double* b) { return dot(a, b, count, 1); };
   const auto few_add = [&](double scale, const double* a, std::vector<double>& to) {
-    for (std::int64_t j = 0; j < count; ++j) to[j] += scale * a[j];
+    add_scaled(scale, a, to.data(), count, 1);
   };
 
   std::copy(g, g + size_, work_.data());
@@ -99,9 +98,7 @@ double Lbfgs::direction_with(const double* g, std::span<const double> beta, Inve
     few_add(weight, along, along_);
   }
   for (std::int64_t k = 0; k < size_; ++k) p[k] = -p[k];
-  double slope = dot(g, p, size_, threads_);
-  for (std::int64_t j = 0; j < count; ++j) slope -= forces_[j] * along_[j];
-  return slope;
+  return dot(g, p, size_, threads_) - few_dot(forces_.data(), along_.data());
 }
 
 }  // namespace qlb

@@ -95,15 +95,6 @@ void RankOneTerms::check_nodes(std::int64_t nodes) const {
                                 std::to_string(nodes) + ")");
 }
 
-double RankOneTerms::dot(std::int64_t j, const double* v) const {
-  double sum = 0.0;
-  for (int i = 0; i < 4; ++i) {
-    const double* at = v + 3 * static_cast<std::int64_t>(nodes_[j][i]);
-    for (int c = 0; c < 3; ++c) sum += vector_[j][3 * i + c] * at[c];
-  }
-  return sum;
-}
-
 void RankOneTerms::add_to(std::int64_t j, double scale, double* out) const {
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < 3; ++c) out[3 * static_cast<std::int64_t>(nodes_[j][i]) + c] += scale * vector_[j][3 * i + c];

@@ -42,7 +42,16 @@ class RankOneTerms {
   // Throws std::invalid_argument where a term has a node outside [0, nodes).
   void check_nodes(std::int64_t nodes) const;
 
-  double dot(std::int64_t j, const double* v) const;                      // a_j . v, v (nodes, 3)
+  // a_j . v, v (nodes, 3)
+  double dot(std::int64_t j, const double* v) const {
+    const double* a = vector_[j].data();
+    double part[4];
+    for (int i = 0; i < 4; ++i) {
+      const double* at = v + 3 * static_cast<std::int64_t>(nodes_[j][i]);
+      part[i] = a[3 * i] * at[0] + a[3 * i + 1] * at[1] + a[3 * i + 2] * at[2];
+    }
+    return (part[0] + part[1]) + (part[2] + part[3]);
+  }
   void add_to(std::int64_t j, double scale, double* out) const;           // out += scale a_j
   void add_combination(std::span<const double> beta, double* out) const;  // out += C beta
   // out += scale C K C^T v, K of `stiffness`
