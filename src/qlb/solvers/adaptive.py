@@ -24,7 +24,7 @@ MAX_RESCUES = 3
 PATIENCE = 5
 DAMPING = 0.2
 COLUMN = 0.02  # cost of the half-solves of a node, in iterations
-RENT = 3  # times the cost of a factor that terms beside it may cost until the next solve makes another
+RENT = 3.5  # times the cost of a factor that terms beside it may cost until another is made
 OUTSIDE = 60  # terms that do not fit into its pattern, from which on it is extended for them
 
 
@@ -41,9 +41,9 @@ class QLA(FactoredLbfgs):
     hold the change of the gradient without contact, whose Hessian of the moment is known.
 
     It is made anew when that is expected to pay: before a solve, when the last one took more iterations than the mean
-    cost of a solve with this factor, or when the terms beside it have cost some times a new one; within a solve, when
-    the iterations that are still to come cost more, or when these terms are too many. A cost is counted in iterations,
-    from the work of the mesh at hand (`qlb.solvers.work`), never from a clock.
+    cost of a solve with this factor; within a solve, when the iterations that are still to come cost more, when the
+    terms beside it are too many, or when they have cost some times a new one. A cost is counted in iterations, from the
+    work of the mesh at hand (`qlb.solvers.work`), never from a clock.
     """
 
     name: ClassVar[str] = "QLA"
@@ -160,8 +160,8 @@ class QLA(FactoredLbfgs):
     ) -> tuple[_native.RankOneTerms, bool]:
         """Terms by which contact differs from what the factor holds; whether they are in place beside it.
 
-        They are not where they are too many, half-solves for their nodes cost more than `most` iterations, or the sum
-        is not definite.
+        They are not where they are too many, half-solves for their nodes cost more than `most` iterations, all terms
+        beside this factor so far have cost some times that, or the sum is not definite.
         """
         assert self._low_rank is not None
         assert self._base is not None
@@ -171,7 +171,7 @@ class QLA(FactoredLbfgs):
         fresh[terms.nodes[beside]] = True
         fresh &= ~self._has_column
         new = COLUMN * np.count_nonzero(fresh)
-        if len(beside) > CROWD or new > most:
+        if len(beside) > CROWD or new > most or self._beside > RENT * most:
             return terms, False
         self._has_column |= fresh
         self._beside += new + cost_of_terms(len(beside), *self._measures)
@@ -209,15 +209,10 @@ class QLA(FactoredLbfgs):
         return share * y + (1 - share) * Bs
 
     def end_solve(self) -> None:
-        """Decide whether the next solve needs a new factor.
-
-        It does where this one cost more than the mean with this factor, or the terms beside it some times a new one.
-        """
+        """Decide whether the next solve needs a new factor: where this one cost more than the mean with this factor."""
         iterations = self._iterations - self._marked_at
         self._solves += 1
-        self._stale = (
-            iterations > (self.kappa + self._spent + iterations) / self._solves or self._beside > RENT * self.kappa
-        )
+        self._stale = iterations > (self.kappa + self._spent + iterations) / self._solves
         self._spent += iterations
 
     def recover(self, problem: StageProblem, point: Point) -> bool:
