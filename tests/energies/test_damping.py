@@ -15,12 +15,10 @@ from qlb import (
     State,
     TetMesh,
     Tolerance,
-    _native,
 )
 from qlb.energies.damping import KelvinVoigt
 from qlb.integrators import INTEGRATORS, Stage
 from qlb.integrators.sdirk2 import A
-from qlb.materials import MATERIALS
 from qlb.system import HeldNodes, StageProblem, System
 from qlb.timing import Timer
 from tests.support import (
@@ -370,35 +368,3 @@ def test_threads_change_no_bit(name: str) -> None:
         ends.append(finish(simulation, 2))
     np.testing.assert_array_equal(ends[0].positions, ends[1].positions)
     np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)
-
-
-@pytest.mark.parametrize("material", MATERIALS)
-def test_the_loop_of_the_material_takes_viscosity_along(material: str, rng: np.random.Generator) -> None:
-    mesh = block(rng)
-    system = make_system(mesh, material=MATERIALS[material](), damping=Damping(viscosity="5 + x"), threads=2)
-    state = moving_state(mesh, rng)
-    (term,) = (term for term in system.terms if isinstance(term, KelvinVoigt))
-    viscosity = term.at(stage_of("SDIRK2", 1, state, rng), mesh.positions)
-    assert viscosity is not None
-    assert system.takes_along(viscosity)
-    assert not system.takes_along(system.potentials[0])
-    x, scale = mesh.positions + 0.02 * rng.normal(size=mesh.positions.shape), 1e-4
-    energy, gradient = system.viscous_energy(x, viscosity, scale)
-    apart = np.zeros_like(x)
-    parts = [part.add_value_gradient(x, scale, apart) for part in (*system.potentials, viscosity)]
-    assert abs(parts[1]) > 1e-3 * abs(parts[0]) > 0  # neither is a trifle
-    assert energy == pytest.approx(sum(parts), rel=1e-13)
-    np.testing.assert_allclose(gradient, apart, rtol=0, atol=1e-13 * np.abs(apart).max())
-
-
-def test_only_viscosity_of_the_same_elements_is_taken_along(rng: np.random.Generator) -> None:
-    mesh = block(rng)
-    one, other = (make_system(mesh, damping=Damping(viscosity=5.0)) for _ in range(2))
-    (term,) = (term for term in other.terms if isinstance(term, KelvinVoigt))
-    viscosity = term.at(stage_of("BDF1", 0, moving_state(mesh, rng), rng), mesh.positions)
-    assert isinstance(viscosity, _native.Viscosity)
-    with pytest.raises(ValueError, match="of other elements"):
-        one.viscous_energy(mesh.positions, viscosity, 1.0)
-    assert isinstance(one.elastic, _native.ElasticEnergy)
-    with pytest.raises(ValueError, match="viscosity: of material 'SNH'"):
-        one.elastic.add_viscous_value_gradient(mesh.positions, one.elastic, 1.0, np.zeros_like(mesh.positions))
