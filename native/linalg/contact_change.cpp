@@ -25,7 +25,7 @@ std::vector<std::pair<std::int64_t, std::int64_t>> in_common(std::span<const std
   pairs.reserve(std::min(a.size(), b.size()));
   auto next = b.begin();
   for (const auto& [key, place] : keyed) {
-    next = std::find_if(next, b.end(), [&](std::int64_t other) { return other >= key; });
+    next = std::find_if(next, b.end(), [least = key](std::int64_t other) { return other >= least; });
     if (next == b.end()) break;
     if (*next == key) pairs.emplace_back(place, next - b.begin());
   }
