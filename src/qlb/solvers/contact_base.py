@@ -16,7 +16,7 @@ NEAR = ((0.03, 2.0), (0.05, 4.0), (0.1, 8.0))
 """What is near enough in stiffness: a difference of this part of the stiffness of the bodies, or so many times more or
 less. From fine to coarse: the coarser, the fewer terms are left, and the more iterations a solve takes."""
 
-CROWD = 600  # terms that the finest of these may leave, or else the next
+CROWD = 600  # terms that may be left: with more the next of these counts, and after the last a new factor is made
 SHIFTED = 0.03  # squared change of the weights of a contact's nodes, from which on it is another contact
 
 
